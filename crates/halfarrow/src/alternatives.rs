@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{BondGraph, Kind, Named, Preference};
 use halfarrow_compiler::causal_graph::assign_causality;
-use halfarrow_compiler::equations::{Equations, derive_minimal};
+use halfarrow_compiler::equations::{Equations, Form, derive_equations, derive_minimal};
 use halfarrow_compiler::ids::Map;
 use halfarrow_compiler::program::{Program, schedule};
 use halfarrow_compiler::span::Span;
@@ -15,6 +15,7 @@ use halfarrow_exec as exec;
 #[derive(Debug)]
 pub(crate) struct Alternatives {
     graph: BondGraph,
+    form: Form,
     /// How many states constants stand for, at most, in the branches of the start.
     conserved: usize,
 }
@@ -38,17 +39,20 @@ impl Alternatives {
                 });
             }
         }
-        Alternatives { graph, conserved: first.conserved.len() }
+        Alternatives { graph, form: first.form, conserved: first.conserved.len() }
     }
 }
 
 impl exec::Alternatives for Alternatives {
-    fn most_states(&self) -> usize {
+    fn most_states(&self) -> Option<usize> {
+        if !self.form.is_explicit() {
+            return None;
+        }
         let ports = self.graph.elements.values().map(|element| match &element.kind {
             Kind::Inertance(storage) | Kind::Compliance(storage) => storage.laws.len(),
             _ => 0,
         });
-        ports.sum::<usize>() + self.graph.signals.len()
+        Some(ports.sum::<usize>() + self.graph.signals.len())
     }
 
     fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
@@ -67,8 +71,10 @@ impl exec::Alternatives for Alternatives {
             graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
         }
         let causal = assign_causality(&graph).ok()?;
-        let conserved = if branches.is_empty() { self.conserved } else { usize::MAX };
-        let equations = derive_minimal(&causal, conserved).ok()?;
+        let equations = match (self.form, branches.is_empty()) {
+            (Form::Minimal, true) => derive_minimal(&causal, self.conserved).ok()?,
+            (form, _) => derive_equations(&causal, form).ok()?,
+        };
         Some(schedule(&equations))
     }
 }

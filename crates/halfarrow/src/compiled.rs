@@ -45,7 +45,7 @@ pub struct Compiled {
 /// What runs.
 #[derive(Debug, Clone)]
 pub(crate) enum Ready {
-    /// The minimal form.
+    /// The minimal form, or one that finds the modes of set-valued laws itself.
     Explicit(Box<exec::Model>),
     /// Another one, beside the minimal form.
     Form {
@@ -62,14 +62,21 @@ impl Model {
     /// The model has errors that only later stages find.
     pub fn compile(&self, form: Form) -> Result<Compiled, Error> {
         let equations = self.equations_in(form)?;
-        let ready = match form {
-            Form::Minimal => Ready::Explicit(Box::new(self.system(&equations)?)),
-            _ => {
+        let ready = match self.runs_alone(form) {
+            true => Ready::Explicit(Box::new(self.system(&equations)?)),
+            false => {
                 let system = Box::new(self.form_system(&equations)?);
-                Ready::Form { system, explicit: equations.residuals.is_empty() }
+                let explicit = equations.residuals.is_empty() && self.graph.set_valued.is_empty();
+                Ready::Form { system, explicit }
             }
         };
         Ok(Compiled { model: Arc::new(self.clone()), form, ready, shares: false, set: BTreeMap::new() })
+    }
+
+    /// Whether a form runs without the minimal one beside it. Where set-valued laws have modes, those of an explicit form are
+    /// found as those of the minimal one are.
+    pub(crate) fn runs_alone(&self, form: Form) -> bool {
+        form == Form::Minimal || form.is_explicit() && !self.graph.set_valued.is_empty()
     }
 }
 

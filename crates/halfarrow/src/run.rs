@@ -357,6 +357,10 @@ impl Model {
             system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
         }
         connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
+        if run.form != Form::Minimal {
+            without_sensitivities(run)?;
+            without_springs(run)?;
+        }
         let mut notes = choose(system, &run.record)?;
         notes.extend(projected(system.program(), run.project, run.method)?);
         let by = quantities(system, run)?;
@@ -381,10 +385,7 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let begun = Moment::now();
-        if !run.sensitivities.is_empty() {
-            let reason = format!("sensitivities are those of the form minimal, not {}", run.form.name());
-            return Err(Problem::BadOption { reason }.into());
-        }
+        without_sensitivities(run)?;
         set_up(&mut system, run)?;
         let mut notes = choose(&mut system, &run.record)?;
         match explicit {
@@ -454,10 +455,12 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder::new(system, &[], notes, progress);
-        let names: Vec<String> = (0..y.len()).map(|i| system.unknown_name(i)).collect();
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
         let outcome = audited.simulate(options, (&mut y, &mut yp), &mut sink);
+        // Those of the mode in which it ends.
+        let unknowns = audited.model();
+        let names = (0..unknowns.unknowns()).map(|i| unknowns.unknown_name(i)).collect();
         let tolerances = sink.tolerances(names);
         let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));
@@ -495,17 +498,16 @@ impl Model {
 
     /// A form beside the minimal one.
     pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
-        if let Some(law) = self.graph.set_valued.first() {
-            let name = &self.graph.elements[law.element].name;
-            let reason = format!(
-                "`{name}` has a set-valued law, whose branch changes while the model runs: only the form minimal follows \
-                 that, leave out --form"
-            );
-            return Err(Problem::BadOption { reason }.into());
-        }
         let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
         let program = self.program_of(equations);
-        self.watch.time("code", || exec::ImplicitModel::new(program, minimal)).map_err(|failure| self.stopped(failure))
+        let code = || match self.graph.set_valued.is_empty() {
+            true => exec::ImplicitModel::new(program, minimal),
+            false => {
+                let modes = Arc::new(Alternatives::new(&self.graph, equations));
+                exec::ImplicitModel::with_modes(program, modes, minimal)
+            }
+        };
+        self.watch.time("code", code).map_err(|failure| self.stopped(failure))
     }
 
     fn run_report(&self, summary: &Summary, reached: f64, audit: AuditReport, notes: Vec<String>) -> RunReport {
@@ -887,6 +889,22 @@ fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
     connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
     set_spring(system, ParameterKind::SpringStiffness, "stiffness", run.stiffness)?;
     set_spring(system, ParameterKind::SpringDamping, "damping", run.damping)
+}
+
+/// Derivatives are those of the minimal form.
+fn without_sensitivities(run: &Run) -> Result<(), Problem> {
+    if run.sensitivities.is_empty() {
+        return Ok(());
+    }
+    let reason = format!("sensitivities are those of the form minimal, not {}", run.form.name());
+    Err(Problem::BadOption { reason })
+}
+
+/// Options of springs need some.
+fn without_springs(run: &Run) -> Result<(), Problem> {
+    let given = [("stiffness", run.stiffness), ("damping", run.damping)];
+    let Some((option, _)) = given.iter().find(|(_, value)| value.is_some()) else { return Ok(()) };
+    Err(Problem::BadOption { reason: format!("{option} is an option of the form stiff") })
 }
 
 /// Sets what an option says of the springs.

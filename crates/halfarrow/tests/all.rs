@@ -86,6 +86,8 @@ mod report;
 mod sensitivity;
 #[path = "set_valued.rs"]
 mod set_valued;
+#[path = "set_valued_forms.rs"]
+mod set_valued_forms;
 #[path = "set_valued_random.rs"]
 mod set_valued_random;
 #[path = "shares.rs"]

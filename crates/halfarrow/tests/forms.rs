@@ -24,9 +24,9 @@ fn models() -> Vec<(String, Model)> {
 }
 
 /// Values on the way, by variable.
-type Values = BTreeMap<String, Vec<f64>>;
+pub(crate) type Values = BTreeMap<String, Vec<f64>>;
 
-fn run(model: &Model, run: &Run) -> Result<Values, Error> {
+pub(crate) fn run(model: &Model, run: &Run) -> Result<Values, Error> {
     let done: Simulated = model.simulate(run, &mut |_| true)?;
     // Every law of the graph holds, whatever the form.
     if run.form != Form::Stiff {
@@ -48,7 +48,7 @@ fn kind(name: &str) -> &str {
 }
 
 /// The greatest difference of what both have at any time, relative to the greatest magnitude of the variable.
-fn apart(a: &Values, b: &Values) -> (f64, String) {
+pub(crate) fn apart(a: &Values, b: &Values) -> (f64, String) {
     let greatest = |values: &[f64]| values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
     let mut kinds: BTreeMap<&str, f64> = BTreeMap::new();
     for (name, values) in a {

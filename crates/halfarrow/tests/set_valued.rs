@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use halfarrow::{FixedMethod, Form, Method, Model, Record, Run, Simulated};
+use halfarrow::{FixedMethod, Method, Model, Record, Run, Simulated};
 
 fn model(text: &str) -> Model {
     let model = Model::from_text("machine.bond", &format!("model Machine\n{text}"), &[]);
@@ -431,7 +431,7 @@ fn friction_turns_round_at_a_dead_centre() {
         let expected = last(&run(&format!("{text}prefer y.f\n"), &Run { method, ..to(0.4, &names) }));
         for (found, expected) in found.iter().zip(&expected) {
             // Half of the digits are lost where one speed tells nothing.
-            close(*found, *expected, 1e-7);
+            close(*found, *expected, 1e-6);
         }
     }
 }
@@ -446,9 +446,6 @@ fn refusals() {
     };
     let joined = "Se:a(1) -> 1:s\nSe:b(2) -> 0:n -> s\ns -> Sw:key(on = t > 1)\nn -> R:r(1)\n";
     assert!(told(joined, 2.0).contains("no branches of the set-valued laws hold together"), "{}", told(joined, 2.0));
-    let form = model("Se:a(1) -> 1:s -> R:d(0 <= f, 0 <= -e)\ns -> R:r(1)\n");
-    let lagrange = form.simulate(&Run { to: 1.0, form: Form::Lagrange, ..Run::default() }, &mut |_| true);
-    assert!(lagrange.expect_err("a refusal").render(false).contains("only the form minimal"));
     for (text, why) in [
         ("Se:a(1) -> 1:s -> R:d(0 <= f)\ns -> R:r(1)\n", "two sides"),
         ("Se:a(1) -> 1:s -> R:d(0 <= t, 0 <= -e)\ns -> R:r(1)\n", "neither the effort nor the flow"),

@@ -160,10 +160,10 @@ fn wrong((text, names): Machine, to: f64, within: f64) -> Option<String> {
 }
 
 /// A model, and what of it is compared.
-type Machine = (String, Vec<String>);
+pub(crate) type Machine = (String, Vec<String>);
 
 /// How the campaign takes a machine of a seed: its kind, the machine, and how near the ends of two methods are.
-fn machines(seed: u64) -> [(&'static str, Machine, f64); 3] {
+pub(crate) fn machines(seed: u64) -> [(&'static str, Machine, f64); 3] {
     [("circuit", circuit(seed), 1e-5), ("row", row(seed, false), 1e-4), ("bouncing row", row(seed, true), 1e-4)]
 }
 

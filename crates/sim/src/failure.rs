@@ -156,6 +156,15 @@ pub enum Failure {
         /// How many modes were tried, and in how many of them no branch holds for long; the others have no equations.
         tried: [usize; 2],
     },
+    /// A form has no equations that go on in the mode of set-valued laws that holds from here on.
+    NoForm {
+        /// When, in s.
+        time: f64,
+        /// The mode: each law with its branch.
+        mode: String,
+        /// What is wrong there.
+        reason: String,
+    },
     /// A contact begins with its sides through each other.
     Overlap {
         /// When, in s.
@@ -263,6 +272,7 @@ impl Failure {
             | Failure::Reset { time, .. }
             | Failure::NotDifferentiable { time, .. }
             | Failure::NoMode { time, .. }
+            | Failure::NoForm { time, .. }
             | Failure::Overlap { time, .. }
             | Failure::Branch { time, .. }
             | Failure::OffMotion { time, .. }
@@ -373,6 +383,9 @@ impl fmt::Display for Failure {
                 by[0].0, by[0].1, by[1].0, by[1].1
             ),
             Failure::Reset { time, what, reason } => write!(f, "at t = {time} s {what} cannot be reset: {reason}"),
+            Failure::NoForm { time, mode, reason } => {
+                write!(f, "from t = {time} s on {mode}: {reason}; another form may go on there, minimal does")
+            }
             Failure::NoMode { time, what, tried: [tried, ended] } => {
                 write!(
                     f,

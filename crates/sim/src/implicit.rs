@@ -7,13 +7,13 @@ mod tolerances;
 use collocated::Collocated;
 use semi_explicit::SemiExplicit;
 
-use crate::driver::Run;
+use crate::driver::{Flow, Run};
 use crate::shared::Shared;
 use crate::simulate::{check_start, counted_in};
 use crate::{Affected, Failure, HybridImplicitSystem, ImplicitSystem, Method, Options, Sink, Stopped, Summary, halves};
 
 /// Integrates `system` in implicit form from the unknowns `y` and their rates `yp` at `options.from` to `options.to`, and
-/// leaves the last ones reached in `y` and `yp`. The method is [`Method::Radau`](crate::Method::Radau), or [`Method::Bdf`] for semi-explicit
+/// leaves the last ones reached in `y` and `yp`, unless events have led to other unknowns. The method is [`Method::Radau`](crate::Method::Radau), or [`Method::Bdf`] for semi-explicit
 /// systems of index 1.
 ///
 /// Start values may be rough: [`handle_event`](crate::Events::handle_event), which is called at the start, makes them
@@ -44,6 +44,9 @@ pub fn simulate_implicit(
 
 /// Which equations hold a rate.
 fn semi_explicit_of_index_1(system: &dyn ImplicitSystem) -> Result<Vec<bool>, Failure> {
+    if system.changes_unknowns() {
+        return Err(Failure::BadMethod { expected: "radau for unknowns that change at events" });
+    }
     if (0..system.unknowns()).any(|unknown| system.index(unknown) > 1) {
         return Err(Failure::BadMethod { expected: "radau for an index above 1" });
     }
@@ -63,18 +66,28 @@ fn by_radau(
     let mut run = Run::new(options, sink, &*system);
     let end = radau(&mut run, system, &mut point);
     let (last, rates) = halves(&point);
-    y.copy_from_slice(last);
-    yp.copy_from_slice(rates);
+    if last.len() == y.len() {
+        y.copy_from_slice(last);
+        yp.copy_from_slice(rates);
+    }
     run.ended(end)
 }
 
-fn radau(run: &mut Run<'_>, system: &mut dyn HybridImplicitSystem, point: &mut [f64]) -> Result<(), Failure> {
+fn radau(run: &mut Run<'_>, system: &mut dyn HybridImplicitSystem, point: &mut Vec<f64>) -> Result<(), Failure> {
     check_point(&*system, run.time, point)?;
     run.start(system, point)?;
-    let mut stepper = Collocated::new(run, system)?;
-    let end = run.drive(&mut stepper, point);
-    stepper.add_work(&mut run.counts);
-    end.map(|_| ())
+    loop {
+        if let Some(next) = system.new_point() {
+            *point = next;
+            check_point(&*system, run.time, point)?;
+        }
+        let mut stepper = Collocated::new(run, system)?;
+        let end = run.drive(&mut stepper, point);
+        stepper.add_work(&mut run.counts);
+        if end? == Flow::GoOn {
+            return Ok(());
+        }
+    }
 }
 
 /// Whether all unknowns and rates are finite where a run starts.

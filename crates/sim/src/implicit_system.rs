@@ -75,6 +75,18 @@ pub trait ImplicitSystem {
     fn semi_explicit(&self) -> Option<&[bool]> {
         None
     }
+
+    /// Whether events may lead to other unknowns.
+    fn changes_unknowns(&self) -> bool {
+        false
+    }
+
+    /// All unknowns, then their rates, where the last event has led to other ones: the method begins anew there. From that
+    /// event on until they are asked for, what is asked at any point is answered at this one, and
+    /// [`exchange_independent`](Events::exchange_independent) says that the system has changed.
+    fn new_point(&mut self) -> Option<Vec<f64>> {
+        None
+    }
 }
 
 /// A system in implicit form with events: what a run takes.

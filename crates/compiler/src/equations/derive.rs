@@ -240,10 +240,10 @@ fn order_equations(
     without_cancelling_terms(&mut d, &states, &algebraic, &ordered.steps, &mut residuals);
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
-    readable(&mut d, jumps.as_ref())?;
+    readable(&mut d, form, jumps.as_ref())?;
     let observed = observed::observed(&mut d, &states, &positions);
     // The other forms start as the minimal one does.
-    let own_start = matches!(form, Form::Minimal | Form::Kane);
+    let own_start = form.is_explicit();
     let mut conditions = if own_start { observed::conditions(&mut d, &positions) } else { Vec::new() };
     if own_start {
         let free = freedom::conditions(&mut d, causal, &sums, &conditions);

@@ -27,6 +27,12 @@ impl Form {
     pub const ALL: [Form; 7] =
         [Form::Minimal, Form::Kane, Form::Inverted, Form::Break, Form::Relaxed, Form::Lagrange, Form::Stiff];
 
+    /// Whether its equations are rates of independent variables, whatever the graph. Such a form finds itself where branches
+    /// of set-valued laws end; the others go by the minimal one.
+    pub fn is_explicit(self) -> bool {
+        matches!(self, Form::Minimal | Form::Kane)
+    }
+
     /// Its name on the command line.
     ///
     /// ```

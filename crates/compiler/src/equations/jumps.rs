@@ -6,7 +6,7 @@ use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, rows_of};
 use super::{Form, Unavailable, observed};
 use crate::algebra::{Expr, ONE, Symbol};
-use crate::bond_graph::{Action, BondGraph, Meaning};
+use crate::bond_graph::{Action, BondGraph, Clause, Meaning};
 use crate::causal_graph::{CausalGraph, Role};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
 use crate::span::Span;
@@ -50,11 +50,12 @@ impl Assembled<'_> {
             truth.ports.ports.iter().filter_map(|s| self.storage_port(truth, s)).collect();
         // A spring whose displacement follows from others keeps nothing by itself.
         ports.retain(|p| !self.d.computed.contains(&p.stored));
-        let actions = || graph.clauses.iter().flat_map(|c| &c.actions);
+        let clauses = || own_clauses(graph, form);
+        let actions = || clauses().flat_map(|c| &c.actions);
         let reset = actions().find(|a| !is_discrete(graph, a));
         let depend = ports.iter().any(|p| p.state.role == Role::Dependent);
         let acts = actions().next().is_some();
-        let switches = !graph.set_valued.is_empty();
+        let switches = form.is_explicit() && !graph.set_valued.is_empty();
         if reset.is_none() && !switches && !(depend && (acts || graph.has_leaping_ratios())) {
             return Ok(None);
         }
@@ -79,7 +80,7 @@ impl Assembled<'_> {
             return Ok(None);
         }
         let mut impulses: Vec<Impulse> = Vec::new();
-        let all = graph.clauses.iter().flat_map(|c| c.actions.iter().map(move |a| (c.bound.is_some(), a)));
+        let all = clauses().flat_map(|c| c.actions.iter().map(move |a| (c.bound.is_some(), a)));
         for (of_bound, action) in all {
             let Some(symbol) = action.impulse.filter(|s| impulses.iter().all(|i| i.symbol != *s)) else { continue };
             let along: Vec<(usize, Expr)> = match moving.storage_of(graph, action.target) {
@@ -146,6 +147,11 @@ impl Moving<'_, '_> {
     }
 }
 
+/// The events that a form looks for: bounds of set-valued laws are not among them where the minimal one does.
+fn own_clauses(graph: &BondGraph, form: Form) -> impl Iterator<Item = &Clause> {
+    graph.clauses.iter().filter(move |clause| clause.bound.is_none() || form.is_explicit())
+}
+
 fn is_discrete(graph: &BondGraph, action: &Action) -> bool {
     matches!(graph.variables.get(&action.target).map(|v| v.meaning), Some(Meaning::Held(_)))
 }
@@ -163,7 +169,7 @@ fn springs(action: &Action) -> Diagnostics {
 }
 
 /// Refuses events that read what has no value.
-pub(super) fn readable(d: &mut Definitions, jumps: Option<&Jumps>) -> Result<(), Diagnostics> {
+pub(super) fn readable(d: &mut Definitions, form: Form, jumps: Option<&Jumps>) -> Result<(), Diagnostics> {
     if let Some(jumps) = jumps {
         let factors = jumps.balances.iter().flatten().chain(jumps.impulses.iter().flat_map(|i| &i.along));
         let mut read: Vec<Expr> = factors.map(|t| t.1).collect();
@@ -174,7 +180,7 @@ pub(super) fn readable(d: &mut Definitions, jumps: Option<&Jumps>) -> Result<(),
             return Err(unreadable(name, span, &reason));
         }
     }
-    for clause in &d.graph.clauses {
+    for clause in own_clauses(d.graph, form) {
         let read = std::iter::once((clause.trigger.expr(), clause.span));
         for (e, span) in read.chain(clause.actions.iter().map(|a| (a.value, a.span))) {
             if let Err(reason) = observed::value_of(d, e) {

@@ -37,6 +37,8 @@ pub struct Bound {
     pub measure: Measure,
     /// Where the margin is a gap: its rate, and the flow of the element with which it stays as it is.
     pub gap: Option<(Value, Value)>,
+    /// While a contact is closed: its gap, which is zero.
+    pub closed: Option<Value>,
 }
 
 /// What a margin is measured in: with which variables of the graph it is compared.
@@ -150,16 +152,18 @@ impl Clause {
             _ => [Some(a.value), None],
         };
         let gap = self.bound.and_then(|b| b.gap).into_iter().flat_map(|(rate, still)| [rate, still]);
-        let margin = self.bound.and_then(|b| b.margin).into_iter().chain(gap);
+        let closed = self.bound.and_then(|b| b.closed);
+        let margin = self.bound.and_then(|b| b.margin).into_iter().chain(gap).chain(closed);
         std::iter::once(self.trigger.value()).chain(margin).chain(self.actions.iter().flat_map(of).flatten())
     }
 }
 
-/// The events of a form. Resets are left out where the form has no [`Jumps`] of its own: another one makes them.
+/// The events of a form, bounds of set-valued laws where it looks for them itself. Resets are left out where the form has no [`Jumps`] of its own: another one makes them.
 pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause> {
     let graph = &equations.graph;
     let mut clauses = Vec::new();
-    for clause in &graph.clauses {
+    let own = |clause: &&bond_graph::Clause| clause.bound.is_none() || equations.form.is_explicit();
+    for clause in graph.clauses.iter().filter(own) {
         let trigger = match clause.trigger {
             bond_graph::Trigger::Becomes(condition) => Trigger::Becomes(lower.value(condition)),
             bond_graph::Trigger::Every(period) => Trigger::Every(lower.value(period)),
@@ -184,7 +188,8 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
                 None if reads(&flow) && !reads(&effort) => Measure::Flow,
                 None => Measure::Effort,
             };
-            Bound { law: law as u32, next: bound.next as u32, margin, measure, gap }
+            let closed = closed_gap(lower, graph, law);
+            Bound { law: law as u32, next: bound.next as u32, margin, measure, gap, closed }
         });
         clauses.push(Clause { name: clause.name.clone(), trigger, actions, bound, span: clause.span });
     }
@@ -202,6 +207,14 @@ fn target(lower: &mut Lowering, equations: &Equations, action: &bond_graph::Acti
             Some(Target::Moved { what: lower.defined(action.target)?, impulse })
         }
     }
+}
+
+/// The gap of a contact that is closed, if all that it reads is evaluated.
+fn closed_gap(lower: &mut Lowering, graph: &BondGraph, law: usize) -> Option<Value> {
+    let own = graph.set_valued[law].constraint.as_ref().filter(|c| c.holonomic)?;
+    graph.constraints.iter().find(|constraint| constraint.element == own.element)?;
+    let known = graph.exprs.symbols_of(own.expr).iter().all(|&symbol| lower.defined(symbol).is_some());
+    known.then(|| lower.value(own.expr))
 }
 
 fn meaning(graph: &BondGraph, symbol: Symbol) -> Option<Meaning> {

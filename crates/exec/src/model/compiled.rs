@@ -25,8 +25,8 @@ pub trait Alternatives: std::fmt::Debug + Send + Sync {
     /// decided at these values of the variables of the graph. `None` if there is none.
     fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
 
-    /// How many states a mode has at most.
-    fn most_states(&self) -> usize;
+    /// How many states a mode has at most: all of them are given so many. `None`: each mode has its own number of unknowns.
+    fn most_states(&self) -> Option<usize>;
 }
 
 /// A model as code: the same for all threads, lanes and runs, whatever their parameters, inputs and states.
@@ -75,9 +75,10 @@ impl Compiled {
     #[must_use]
     pub fn with_alternatives(self, alternatives: Arc<dyn Alternatives>) -> Compiled {
         let program = &self.first.program;
-        let first = match program.set_valued.is_empty() || program.states.len() >= alternatives.most_states() {
-            true => self.first,
-            false => Arc::new(Mode::of(program.clone().with_idle_states(alternatives.most_states()), &self.first)),
+        let most = alternatives.most_states().filter(|most| program.states.len() < *most);
+        let first = match most.filter(|_| !program.set_valued.is_empty()) {
+            None => self.first,
+            Some(most) => Arc::new(Mode::of(program.clone().with_idle_states(most), &self.first)),
         };
         Compiled { first, alternatives: Some(alternatives), others: self.others }
     }
@@ -139,9 +140,13 @@ impl Compiled {
             return *known;
         }
         let states = self.first.program.states.len();
-        let program = self.alternatives.as_ref()?.program(&key.0, &key.1, point);
+        let alternatives = self.alternatives.as_ref()?;
+        let program = alternatives.program(&key.0, &key.1, point);
         let fits = |p: &Program| p.states.len() == states || !p.set_valued.is_empty() && p.states.len() < states;
-        let program = program.filter(fits).map(|program| program.with_idle_states(states));
+        let program = match alternatives.most_states() {
+            Some(_) => program.filter(fits).map(|program| program.with_idle_states(states)),
+            None => program,
+        };
         let mode = program.map(|program| Mode::of(program, &self.first));
         let mut others = self.others();
         let id = mode.map(|mode| {

@@ -200,7 +200,7 @@ impl Model {
     }
 
     /// Lets happen what has been found to happen, and goes on in the mode that holds after it.
-    fn settle_all(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
+    pub(super) fn settle_all(&mut self, t: f64, x: &mut [f64]) -> Result<(), Failure> {
         self.note_compared(t, x)?;
         self.run_clauses(t, x)?;
         for _ in 0..MOST_MODES {

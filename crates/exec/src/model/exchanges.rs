@@ -224,6 +224,8 @@ impl Model {
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         self.projection = None;
+        let states = code.program.states.len();
+        [&mut self.dx, &mut self.beside].into_iter().for_each(|room| room.resize(states, 0.0));
         (self.frame, self.recorded, self.code) = (frame, recorded, code);
         self.rated = None;
         self.reserve_recorded();

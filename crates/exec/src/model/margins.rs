@@ -6,7 +6,7 @@
 use super::Model;
 use super::modes::Extents;
 use crate::bytecode::{Hold, Layout, Routine};
-use halfarrow_compiler::program::{Bound, ConditionId, Margin, Program};
+use halfarrow_compiler::program::{Bound, ConditionId, Margin, Program, Value};
 use halfarrow_sim::Failure;
 use std::ops::Range;
 
@@ -40,6 +40,8 @@ pub(super) struct Bounds {
     /// Efforts and flows that are compared: computes them, and the places of each group among them.
     compared: Routine,
     groups: Vec<Range<usize>>,
+    /// Computes the gaps of contacts that are closed.
+    pub closed: Routine,
 }
 
 /// How a margin stands.
@@ -79,12 +81,14 @@ impl Bounds {
         });
         let groups = ends.collect();
         let compared = layout.routine(program, &bounds.compared.concat());
+        let closed: Vec<Value> = program.clauses.iter().filter_map(|c| c.bound?.closed).collect();
+        let closed = layout.routine(program, &closed);
         let halfarrow_compiler::program::Bounds { margins, commands, branches, .. } = bounds;
-        Some(Bounds { margins, commands, routine, branches, compared, groups })
+        Some(Bounds { margins, commands, routine, branches, compared, groups, closed })
     }
 
     pub fn routines(&self) -> impl Iterator<Item = &Routine> {
-        [&self.routine, &self.compared].into_iter()
+        [&self.routine, &self.compared, &self.closed].into_iter()
     }
 }
 

@@ -277,12 +277,36 @@ impl Model {
             notes: Vec::new(),
         };
         report.notes = notes(&report);
+        if !self.graph.set_valued.is_empty() {
+            let mode = self.graph.mode_name();
+            report
+                .notes
+                .push(format!("unknowns, index and operations are those of one mode of set-valued laws: {mode}"));
+        }
         report.notes.extend(budget.note(cut));
         Ok(report)
     }
 
-    /// Whether the form `stiff` has springs: without constraints there are none.
+    /// Whether the form `stiff` has springs: without constraints there are none. Where there are set-valued laws, in the mode
+    /// of the graph or with one of them on another branch.
     fn has_springs(&self) -> Result<bool, Error> {
+        if self.springs_in_mode()? {
+            return Ok(true);
+        }
+        let mode = self.graph.mode();
+        for (law, present) in mode.iter().enumerate() {
+            for branch in (0..self.graph.set_valued[law].branches.len()).filter(|branch| branch != present) {
+                let mut other = mode.clone();
+                other[law] = branch;
+                if self.with_graph(self.graph.in_mode(&other)).springs_in_mode().unwrap_or(false) {
+                    return Ok(true);
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    fn springs_in_mode(&self) -> Result<bool, Error> {
         let equations = self.equations_in(Form::Stiff)?;
         let x = &equations.graph.exprs;
         let mut parameters = equations.graph.parameters.values();

@@ -114,13 +114,13 @@ impl Model {
     pub(super) fn subject(&self, run: &Run) -> Result<Subject<'_>, Error> {
         let equations = self.equations_in(run.form)?;
         let graph = &self.graph;
-        if run.form == Form::Minimal {
+        if self.runs_alone(run.form) {
             let mut system = self.system(&equations)?;
             connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
             let x = self.start(&mut system, run.start)?;
             return Ok(Subject { graph, form: run.form, system: Ready::Explicit(system, x) });
         }
-        let explicit = equations.residuals.is_empty();
+        let explicit = equations.residuals.is_empty() && self.graph.set_valued.is_empty();
         let mut system = self.implicit_system(&equations, run)?;
         let x = self.start(system.reference_mut(), Start::Given)?;
         set_spring_rate(&mut system, &x)?;
@@ -140,7 +140,7 @@ impl Subject<'_> {
             Ready::Explicit(..) => vec![Method::Explicit, Method::Bdf, Method::Radau],
             Ready::Implicit(system, ..) => {
                 let index_1 = (0..system.unknowns()).all(|unknown| system.index(unknown) == 1);
-                let bdf = index_1 && system.semi_explicit().is_some();
+                let bdf = index_1 && !system.changes_unknowns() && system.semi_explicit().is_some();
                 if bdf { vec![Method::Radau, Method::Bdf] } else { vec![Method::Radau] }
             }
         }

@@ -30,12 +30,12 @@ pub(super) struct Collocated<'a> {
 }
 
 impl<'a> Collocated<'a> {
-    /// Of a run whose system stands at its start.
+    /// Of a run whose system stands where it begins or goes on.
     ///
     /// # Errors
     /// What the system reports.
     pub(super) fn new(run: &Run<'_>, system: &'a mut dyn HybridImplicitSystem) -> Result<Collocated<'a>, Failure> {
-        let tolerances = Tolerances::new(run.options, system)?;
+        let tolerances = Tolerances::new(run.options, run.time, system)?;
         let radau = Radau::new(system, tolerances.relative(), tolerances.absolute());
         Ok(Collocated {
             system,
@@ -58,6 +58,18 @@ impl<'a> Collocated<'a> {
     fn take_tolerances(&mut self, run: &mut Run<'_>) {
         self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
         run.report_tolerances(self.tolerances.magnitudes(), self.tolerances.absolute());
+    }
+
+    /// Takes magnitudes anew where no step is short enough; whether that helps.
+    fn renew(&mut self, time: f64, interval: f64, point: &[f64]) -> Result<bool, Failure> {
+        let (y, yp) = halves(point);
+        let moved = self.radau.rates_alone(&mut *self.system, time, y, yp)?;
+        if !self.tolerances.renew(&mut *self.system, time, (y, &moved), interval)? {
+            return Ok(false);
+        }
+        self.radau.set_tolerances(self.tolerances.relative(), self.tolerances.absolute());
+        self.radau.restart(time, y, yp, UNKNOWN * interval);
+        Ok(true)
     }
 
     /// Whether the event left the unknowns alone and the step that ended there would not have told their rates from its own.
@@ -88,16 +100,25 @@ impl Stepper for Collocated<'_> {
         }
         self.tolerances.guess(&mut *self.system, time, (y, yp), stop - time)?;
         self.take_tolerances(run);
+        self.system.note_magnitudes(time, point, self.tolerances.magnitudes())?;
         let moved = self.radau.rates_alone(&mut *self.system, time, y, yp)?;
-        let (size, speed) = (self.tolerances.norm(y, y), self.tolerances.norm(&moved, y));
+        // What passes through 0 has its size from elsewhere.
+        let sizes: Vec<f64> = y.iter().zip(self.tolerances.magnitudes()).map(|(y, most)| y.abs().max(*most)).collect();
+        let (size, speed) = (self.tolerances.norm(&sizes, y), self.tolerances.norm(&moved, y));
         let step = if size < 1e-5 || speed < 1e-5 { UNKNOWN * longest } else { CAREFUL * size / speed };
         self.radau.restart(time, y, yp, step.min(longest));
         Ok(Flow::GoOn)
     }
 
-    fn step(&mut self, from: f64, _: f64, stop: f64, _: &[f64]) -> Result<f64, Failure> {
+    fn step(&mut self, from: f64, _: f64, stop: f64, point: &[f64]) -> Result<f64, Failure> {
         self.from = from;
-        self.radau.step(&mut *self.system, stop.min(from + self.most))?;
+        let latest = stop.min(from + self.most);
+        match self.radau.step(&mut *self.system, latest) {
+            Err(Failure::StepTooSmall { .. }) if self.renew(from, latest - from, point)? => {
+                self.radau.step(&mut *self.system, latest)?;
+            }
+            made => made?,
+        }
         let end = self.radau.time();
         Ok(if is_at(end, stop, self.radau.start()) { stop } else { end })
     }

@@ -20,6 +20,12 @@ const SHORT: f64 = 0.01;
 /// Part of the way to the next stop over which they are let grow at most.
 const PART: f64 = 1e-3;
 
+/// A magnitude is rounding where what the rates make of its unknown in a short time is beyond it by so many times.
+const LEFT: f64 = 1e-6;
+
+/// By how much magnitudes have to grow for tolerances to be taken anew.
+const GROWTH: f64 = 10.0;
+
 /// Relative and absolute tolerances.
 pub(super) struct Tolerances {
     relative: f64,
@@ -33,11 +39,11 @@ pub(super) struct Tolerances {
 }
 
 impl Tolerances {
-    /// Those of a run of `system`, which stands at its start.
+    /// Those of a run of `system` from `t` on, where it stands.
     ///
     /// # Errors
     /// What the system reports.
-    pub(super) fn new(options: &Options, system: &mut dyn ImplicitSystem) -> Result<Tolerances, Failure> {
+    pub(super) fn new(options: &Options, t: f64, system: &mut dyn ImplicitSystem) -> Result<Tolerances, Failure> {
         let size = system.unknowns();
         let given = match &options.atol {
             AbsoluteTolerance::Scaled => None,
@@ -45,7 +51,7 @@ impl Tolerances {
             AbsoluteTolerance::Each(atol) => Some(atol.clone()),
         };
         let absolute = given.clone().unwrap_or(vec![0.0; size]);
-        let magnitudes = system.scales(options.from, options.to - options.from)?;
+        let magnitudes = system.scales(t, options.to - t)?;
         Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, looked: false })
     }
 
@@ -136,6 +142,32 @@ impl Tolerances {
         unknown.iter().for_each(|&i| self.magnitudes[i] = grown[i].max(GUESS * balanced[i]));
         self.watch(y);
         Ok(())
+    }
+
+    /// Takes magnitudes anew where the system stands at `(t, y, y')` and no step is short enough: what its rates leave behind at
+    /// once was rounding, as where an event moves what stood still. `true` if any has grown by far.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub(super) fn renew(
+        &mut self,
+        system: &mut dyn ImplicitSystem,
+        t: f64,
+        (y, yp): (&[f64], &[f64]),
+        interval: f64,
+    ) -> Result<bool, Failure> {
+        if self.given.is_some() {
+            return Ok(false);
+        }
+        let before = self.magnitudes.clone();
+        let left = |magnitude: f64, rate: f64| magnitude < LEFT * PART * interval * rate.abs();
+        let noise = self.magnitudes.iter_mut().zip(yp).filter(|(magnitude, rate)| left(**magnitude, **rate));
+        noise.for_each(|(magnitude, _)| *magnitude = 0.0);
+        self.looked = false;
+        self.guess(system, t, (y, yp), interval)?;
+        self.magnitudes.iter_mut().zip(&before).for_each(|(now, before)| *now = now.max(*before));
+        self.watch(y);
+        Ok(self.magnitudes.iter().zip(&before).any(|(now, before)| *now > GROWTH * before))
     }
 
     /// Gives what is still not known what its equations balance, one equation further at a time.

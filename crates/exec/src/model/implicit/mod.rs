@@ -1,15 +1,18 @@
 //! Any form of a graph as a system `F(t, y, y') = 0`, with the minimal form beside it: that knows what is consistent.
 
 mod consistent;
+mod modes;
 mod state_map;
 mod system;
 
 use super::{
-    Executed, Execution, Expected, InputError, Memory, Model, Operations, ParameterError, RecordError, StartError,
+    Alternatives, Compiled, Executed, Execution, Expected, InputError, Memory, Model, Operations, ParameterError,
+    RecordError, StartError,
 };
 use crate::machine::MachineError;
 use halfarrow_compiler::program::Program;
 use halfarrow_sim::{Events as _, Failure, ImplicitSystem as _, System};
+use modes::Maps;
 use state_map::{StateMap, without_rates_of_inputs};
 use std::sync::Arc;
 
@@ -23,9 +26,14 @@ pub struct ImplicitModel {
     form: Model,
     reference: Model,
     map: Arc<StateMap>,
+    maps: Arc<Maps>,
     /// The state of the reference.
     x: Vec<f64>,
     begun: bool,
+    /// Whether the run has been told how great its unknowns are.
+    scaled: bool,
+    /// The unknowns and their rates in the mode to which the last event has led, until the method goes on from them.
+    entered: Option<Vec<f64>>,
 }
 
 /// What a run of a form remembers, and the minimal form beside it.
@@ -35,6 +43,7 @@ pub struct ImplicitMemory {
     reference: Memory,
     x: Vec<f64>,
     begun: bool,
+    entered: Option<Vec<f64>>,
 }
 
 impl ImplicitModel {
@@ -42,14 +51,35 @@ impl ImplicitModel {
     ///
     /// # Errors
     /// Equations of parameters alone that have no solution.
-    pub fn new(mut program: Program, mut reference: Model) -> Result<ImplicitModel, Failure> {
+    pub fn new(mut program: Program, reference: Model) -> Result<ImplicitModel, Failure> {
         without_rates_of_inputs(&mut program, reference.program());
-        let mut form = Model::new(program)?;
-        form.led = form.code.program.implicit.is_some();
+        Ok(ImplicitModel::of(Model::new(program)?, reference))
+    }
+
+    /// The same in all modes of set-valued laws: programs of the form in these come from `alternatives`, and `reference`
+    /// finds which of them holds.
+    ///
+    /// # Errors
+    /// As [`new`](ImplicitModel::new).
+    pub fn with_modes(
+        mut program: Program,
+        alternatives: Arc<dyn Alternatives>,
+        mut reference: Model,
+    ) -> Result<ImplicitModel, Failure> {
+        without_rates_of_inputs(&mut program, reference.program());
+        // What has no value in some mode is no reason to leave that out.
+        let _ = reference.record(&[]);
+        let compiled = Compiled::new(program).with_alternatives(alternatives);
+        Ok(ImplicitModel::of(Model::of(Arc::new(compiled))?, reference))
+    }
+
+    fn of(mut form: Model, mut reference: Model) -> ImplicitModel {
+        let modes = !reference.code.program.set_valued.is_empty();
+        form.led = modes || form.code.program.implicit.is_some();
         let map = Arc::new(StateMap::new(&mut form, &mut reference));
         let x = vec![0.0; reference.states()];
         form.restart();
-        Ok(ImplicitModel { form, reference, map, x, begun: false })
+        ImplicitModel { form, reference, map, maps: Arc::default(), x, begun: false, scaled: false, entered: None }
     }
 
     /// The program of the form.
@@ -167,8 +197,9 @@ impl ImplicitModel {
 
     /// What the run remembers, as [`Model::memory`].
     pub fn memory(&self) -> ImplicitMemory {
-        let ImplicitModel { form, reference, x, begun, .. } = self;
-        ImplicitMemory { form: form.memory(), reference: reference.memory(), x: x.clone(), begun: *begun }
+        let ImplicitModel { form, reference, x, begun, entered, .. } = self;
+        let (x, entered) = (x.clone(), entered.clone());
+        ImplicitMemory { form: form.memory(), reference: reference.memory(), x, begun: *begun, entered }
     }
 
     /// Goes on from it, as [`Model::restore`].
@@ -180,6 +211,10 @@ impl ImplicitModel {
         self.reference.restore(&memory.reference);
         self.x.copy_from_slice(&memory.x);
         self.begun = memory.begun;
+        self.entered.clone_from(&memory.entered);
+        if self.has_modes() {
+            self.take_map(f64::NAN).expect("the form has run in this mode");
+        }
     }
 
     /// Unknowns and their rates at the start of a run at `t`, those of the minimal form. Unknowns that it does not know (a
@@ -201,14 +236,15 @@ impl ImplicitModel {
         if let Some(failure) = self.form.broken() {
             return Err(failure);
         }
-        self.begun = false;
+        (self.begun, self.scaled, self.entered) = (false, false, None);
         self.x.copy_from_slice(x);
+        self.reference.handle_event(t, &mut self.x)?;
+        self.follow_mode(t)?;
         let n = self.unknowns();
         let (mut y, mut yp) = (vec![0.0; n], vec![0.0; n]);
         if self.map.twin {
             self.form.run.conserved.copy_from_slice(&self.reference.run.conserved);
         }
-        self.reference.handle_event(t, &mut self.x)?;
         self.guess(t)?;
         self.take_over(t, &mut y)?;
         self.form.handle_event(t, &mut y)?;

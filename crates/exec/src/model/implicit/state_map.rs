@@ -39,8 +39,8 @@ pub(super) struct StateMap {
     pub twin: bool,
     /// Algebraic unknowns of a higher index, whose errors nothing controls while running.
     pub uncontrolled: Vec<usize>,
-    /// Whether the form tells every state of the reference.
-    pub all_told: bool,
+    /// The states of the reference that the form does not tell, by name.
+    pub untold: Vec<String>,
 }
 
 impl StateMap {
@@ -89,14 +89,16 @@ impl StateMap {
         let sparsity = sparsity_of(own, &equations);
         let names = |p: &Program| p.states.iter().map(|s| s.name.clone()).collect::<Vec<_>>();
         let twin = own.implicit.is_none()
+            && own.set_valued.is_empty()
             && own.tracked == other.tracked
             && own.conserved == other.conserved
             && names(own) == names(other);
         let algebraic = |i: &usize| !equations.differential[*i] && equations.indices[*i] > 1;
-        let all_told = pairs.len() == other.states.len();
+        let silent = (0..other.tracked.len()).filter(|k| pairs.iter().all(|pair| pair.0 != *k));
+        let silent: Vec<String> = silent.map(|k| other.states[k].name.clone()).collect();
         StateMap {
-            all_told,
-            uncontrolled: (0..n).filter(|i| all_told && algebraic(i)).collect(),
+            uncontrolled: (0..n).filter(|i| silent.is_empty() && algebraic(i)).collect(),
+            untold: silent,
             of_states: form.routine_for(&seen),
             positions,
             of_positions: form.routine_for(&of_positions),
@@ -116,6 +118,15 @@ impl StateMap {
             equations,
             twin,
         }
+    }
+
+    /// Makes room for the routines in the registers of both.
+    pub fn reserve(&self, form: &mut Model, reference: &mut Model) {
+        let StateMap { of_states, of_positions, common, carried, .. } = self;
+        [of_states, of_positions, common, carried].into_iter().for_each(|routine| form.frame.reserve(routine));
+        let StateMap { of_known, common_there, of_guesses, carried_there, .. } = self;
+        let there = [of_known, common_there, of_guesses, carried_there];
+        there.into_iter().for_each(|routine| reference.frame.reserve(routine));
     }
 }
 

@@ -6,7 +6,7 @@ use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System as _, halv
 impl ImplicitModel {
     /// Of the clauses that happen, those that rounding leaves before their border in the reference. Where no state moves, they
     /// have happened nevertheless.
-    fn late(&mut self, t: f64, told: &[bool]) -> Result<Vec<bool>, Failure> {
+    pub(super) fn late(&mut self, t: f64, told: &[bool]) -> Result<Vec<bool>, Failure> {
         let x = std::mem::take(&mut self.x);
         let seen = self.reference.becoming(t, &x);
         self.x = x;
@@ -34,10 +34,16 @@ impl ImplicitSystem for ImplicitModel {
 
     /// Those of the minimal form where it has the same unknown.
     fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure> {
-        let ImplicitModel { reference, form, x, .. } = self;
-        let known = halfarrow_sim::magnitudes(reference, (t, x), span)?;
-        let tracked = &reference.code.program.tracked;
-        let of = |symbol| tracked.iter().position(|tracked| tracked == symbol).map_or(0.0, |k| known[k]);
+        let ImplicitModel { reference, form, x, scaled, .. } = self;
+        // In the modes that follow, what has been tells more than what passes through 0 there.
+        let known = match std::mem::replace(scaled, !reference.code.program.set_valued.is_empty()) {
+            false => halfarrow_sim::magnitudes(reference, (t, x), span)?,
+            true => reference.run.scales.clone(),
+        };
+        let (tracked, been) = (&reference.code.program.tracked, &reference.run.extents.states);
+        let been = |symbol| been.get(symbol).copied().unwrap_or(0.0);
+        let of =
+            |symbol| tracked.iter().position(|tracked| tracked == symbol).map_or(0.0, |k| known[k]).max(been(symbol));
         Ok(form.code.program.tracked.iter().map(of).collect())
     }
 
@@ -89,6 +95,14 @@ impl ImplicitSystem for ImplicitModel {
         Ok(())
     }
 
+    fn changes_unknowns(&self) -> bool {
+        self.has_modes()
+    }
+
+    fn new_point(&mut self) -> Option<Vec<f64>> {
+        self.entered.take()
+    }
+
     fn semi_explicit(&self) -> Option<&[bool]> {
         let free = |(explicit, differential): (&bool, &bool)| *differential && !explicit;
         let none = !self.map.equations.explicit.iter().zip(&self.map.equations.differential).any(free);
@@ -102,24 +116,45 @@ impl Events for ImplicitModel {
     }
 
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
-        self.form.next_time_event(t)
+        let own = self.form.next_time_event(t);
+        // Only the minimal form obeys switches.
+        let there = if self.has_modes() { self.reference.next_time_event(t) } else { None };
+        own.into_iter().chain(there).reduce(f64::min)
     }
 
     fn is_corner(&mut self, t: f64) -> bool {
-        self.form.is_corner(t)
+        self.form.is_corner(t) && (!self.has_modes() || self.reference.is_corner(t))
     }
 
     fn indicators(&self) -> usize {
-        self.form.indicators()
+        self.form.indicators() + if self.has_modes() { self.reference.indicators() } else { 0 }
     }
 
+    fn indicator_name(&self, indicator: usize) -> String {
+        match indicator.checked_sub(self.form.indicators()) {
+            None => self.form.indicator_name(indicator),
+            Some(there) => self.reference.indicator_name(there),
+        }
+    }
+
+    /// Those of the form, then, where there are bounds of branches, those of the minimal form.
     fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
-        let (y, yp) = halves(point);
+        let entered = self.entered.clone();
+        let (y, yp) = halves(entered.as_deref().unwrap_or(point));
         self.place_rates(yp);
-        self.form.event_indicators(t, y, g)
+        let (own, there) = g.split_at_mut(self.form.indicators());
+        self.form.event_indicators(t, y, own)?;
+        if self.has_modes() {
+            self.follow_back(t, y, yp)?;
+            self.reference.event_indicators(t, &self.x, there)?;
+        }
+        Ok(())
     }
 
     fn handle_event(&mut self, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        if self.has_modes() {
+            return self.handle_modes(t, point);
+        }
         let (y, yp) = halves_mut(point);
         let implicit = self.form.code.program.implicit.is_some();
         if !self.begun || !implicit {
@@ -150,16 +185,39 @@ impl Events for ImplicitModel {
         self.settle(t, y, yp)
     }
 
+    fn exchange_independent(&mut self, t: f64, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        if self.has_modes() && self.entered.is_none() && !failed {
+            let (y, yp) = halves(point);
+            self.settle_untold(t, y, yp)?;
+        }
+        Ok(self.entered.is_some())
+    }
+
+    fn note_magnitudes(&mut self, t: f64, point: &[f64], _: &[f64]) -> Result<(), Failure> {
+        if !self.has_modes() {
+            return Ok(());
+        }
+        let (y, yp) = halves(point);
+        self.note_unknowns(y);
+        self.follow_back(t, y, yp)?;
+        self.reference.watch_bounds(t, &self.x)
+    }
+
+    fn looks_between(&self) -> bool {
+        self.has_modes()
+    }
+
     fn locates_crossings(&self) -> bool {
         self.reference.locates_crossings()
     }
 
     fn accept(&mut self, t: f64, point: &[f64]) -> Result<(), Failure> {
-        let (y, yp) = halves(point);
+        let entered = self.entered.clone();
+        let (y, yp) = halves(entered.as_deref().unwrap_or(point));
         self.place_rates(yp);
         self.form.accept(t, y)?;
         let observed = !self.map.uncontrolled.is_empty() && !self.form.recorded().is_empty();
-        if self.reference.has_delays() || observed && self.reference.follows_solutions_at_all() {
+        if self.has_modes() || self.reference.has_delays() || observed && self.reference.follows_solutions_at_all() {
             self.follow_back(t, y, yp)?;
             self.reference.accept(t, &self.x)?;
         }
@@ -175,7 +233,8 @@ impl Events for ImplicitModel {
     }
 
     fn observe(&mut self, t: f64, point: &[f64], out: &mut [f64]) -> Result<(), Failure> {
-        let (y, yp) = halves(point);
+        let entered = self.entered.clone();
+        let (y, yp) = halves(entered.as_deref().unwrap_or(point));
         let (y, yp) = match (self.form.recorded().is_empty(), self.map.uncontrolled.is_empty()) {
             (true, _) => (y.to_vec(), yp.to_vec()),
             (false, true) => self.consistent(t, y, yp)?,
