@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from . import _halfarrow
 from ._errors import UsageError, unknown
-from .result import Drift, record
+from ._tables import record
+from .result import Drift
 
 if TYPE_CHECKING:
     from .model import Model
