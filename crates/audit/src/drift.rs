@@ -117,7 +117,7 @@ impl Relation {
         let (mut room, mut before) = (Vec::new(), None);
         let mut begin = self.begin;
         for sample in 0..values.times.len() {
-            let value = reader.values_in(&mut room, sample, &[])?[0];
+            let [value] = reader.values_in(&mut room, sample, &[])?[0];
             let at_once = sample > 0 && values.times[sample] <= values.times[sample - 1];
             let jump = if at_once { before.map_or(0.0, |before| value - before) } else { 0.0 };
             let from = begin.map_or(value, |begin: f64| begin + jump);
@@ -158,10 +158,10 @@ impl Relation {
         let integrals: Vec<_> = columns.iter().map(|column| values.quadrature.integrate(column)).collect();
         let positions: Option<Vec<&[f64]>> = self.positions.iter().map(|p| values.column(p.0)).collect();
         let positions = positions?;
-        let (mut room, mut drift) = (Vec::new(), self.last);
-        let mut before = factors.values_in(&mut room, 0, &[])?.to_vec();
+        let mut drift = self.last;
+        let mut before = factors.values(0, &[])?;
         for sample in 1..n {
-            let now = factors.values_in(&mut room, sample, &[])?.to_vec();
+            let now = factors.values(sample, &[])?;
             if values.times[sample] > values.times[sample - 1] {
                 for (k, (position, integral)) in positions.iter().zip(&integrals).enumerate() {
                     let factor = 0.5 * (before[k] + now[k]);

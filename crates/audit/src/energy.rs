@@ -89,7 +89,7 @@ pub(crate) fn rates(
             }
         };
         let mut room = Vec::new();
-        let mut at = |k: usize| reader.values_in(&mut room, k, &[]).map_or(f64::NAN, |v| v[0]);
+        let mut at = |k: usize| reader.values_in(&mut room, k, &[]).map_or(f64::NAN, |v| v[0][0]);
         let rate: Vec<f64> = (0..x.len()).map(&mut at).collect();
         if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
             unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
@@ -297,7 +297,7 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(V
     let law = EvaluationOrder::new(&graph.exprs, &[law]);
     let numbers: Vec<Option<f64>> = law.symbols().iter().map(|&s| values.parameter(s).filter(|_| s != own)).collect();
     let mut room = Vec::new();
-    let mut z = |x: f64| law.values_in(&mut room, |k| numbers[k].unwrap_or(x))[0];
+    let mut z = |x: f64| law.values_in(&mut room, |k| [numbers[k].unwrap_or(x)])[0][0];
     // What an impulse gives or takes is no power of any sample.
     let jumps = jumps(values.times, x, JUMPED * greatest(x));
     let (mut energy, mut gained) = (vec![0.0; x.len()], Vec::new());

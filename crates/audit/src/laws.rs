@@ -1,9 +1,9 @@
 //! Every law of every junction and element, at every sample.
 
 use crate::constraints::Share;
-use crate::scales::{Quantity, Scales, Settled, Term};
+use crate::scales::{Quantity, Scale, Scales, Settled, Term};
 use crate::terms::Terms;
-use crate::values::{Reader, Values};
+use crate::values::{AT_ONCE, Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw, TwoPortRow};
@@ -29,6 +29,28 @@ enum Law<'a> {
     Row { left: &'a [f64], factors: Vec<Expr>, right: Vec<(&'a [f64], Quantity)>, what: &'static str, of: Quantity },
     /// An expression vanishes.
     Zero { expr: Expr, what: &'static str },
+}
+
+impl Law<'_> {
+    /// What it says something of.
+    fn what(&self) -> &'static str {
+        let (Law::Sum { what, .. }
+        | Law::Value { what, .. }
+        | Law::Product { what, .. }
+        | Law::Row { what, .. }
+        | Law::Zero { what, .. }) = self;
+        what
+    }
+
+    /// The quantity that it is about as a term of its scale, if it is about one.
+    fn natural(&self) -> Option<Term> {
+        match self {
+            Law::Sum { of, .. } | Law::Value { of, .. } | Law::Product { of, .. } | Law::Row { of, .. } => {
+                Some(Term::of(*of, 1.0))
+            }
+            Law::Zero { .. } => None,
+        }
+    }
 }
 
 /// Moduli that are written as quotients whose divisor may vanish: what stands over and under the line.
@@ -58,7 +80,8 @@ pub(crate) fn residual(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    let mut check = Check { graph, values, scales, settled, worst };
+    let mut check = Check { graph, values, scales, settled, worst, laws: 0 };
+    let mut written = Vec::new();
     for (name, symbol, left, right) in &values.same {
         let of = scales.of(graph, *symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
@@ -70,7 +93,7 @@ pub(crate) fn residual(
             unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
         }
         for law in laws.laws {
-            if let Err(missing) = check.law(&element.name, &law) {
+            if let Err(missing) = check.law(&element.name, law, &mut written) {
                 unchecked.push(format!("a law of {}: {missing} is not known", element.name));
             }
         }
@@ -78,13 +101,14 @@ pub(crate) fn residual(
     for share in shares {
         let name = &graph.elements[share.junction].name;
         let checked = match share_of_constraint(values, scales, share) {
-            Some(law) => check.law(name, &law).map_err(|missing| format!("{missing} is not known")),
+            Some(law) => check.law(name, law, &mut written).map_err(|missing| format!("{missing} is not known")),
             None => Err("not all of its efforts are known".to_string()),
         };
         if let Err(why) = checked {
             unchecked.push(format!("a constraint at {name}: {why}"));
         }
     }
+    check.written(&written);
 }
 
 /// What a constraint puts on a junction.
@@ -341,6 +365,62 @@ impl<'a> Laws<'a, '_> {
     }
 }
 
+/// A law with expressions, and what reads them.
+struct Written<'v, 'a> {
+    name: &'v str,
+    law: Law<'a>,
+    reader: Reader<'v, 'a>,
+    /// Which of all laws it is.
+    number: usize,
+    /// The least that a miss counts relative to.
+    scale: Scale,
+    /// Of a product, how great what is multiplied is beside what it makes.
+    ratio: f64,
+}
+
+impl Written<'_, '_> {
+    /// By how much it is missed at a sample where its expressions have these values.
+    fn miss(&self, sample: usize, v: &[f64]) -> f64 {
+        match &self.law {
+            Law::Sum { .. } => unreachable!("it has no expressions"),
+            Law::Value { left, .. } => left[sample] - v[0],
+            Law::Product { left, right: (right, _), .. } => {
+                let sum = left.iter().map(|(sign, column)| sign * column[sample]).sum::<f64>();
+                let made = v[0] * right[sample];
+                match v[1..].first() {
+                    None => sum - made,
+                    // Where the divisor vanishes, what is divided does.
+                    Some(divisor) => {
+                        (divisor * sum - made) / divisor.abs().max(v[0].abs() * self.ratio).max(f64::MIN_POSITIVE)
+                    }
+                }
+            }
+            Law::Row { left, right, .. } => {
+                let made = v.iter().zip(right).map(|(factor, (column, _))| factor * column[sample]);
+                left[sample] - made.sum::<f64>()
+            }
+            Law::Zero { .. } => v.iter().sum(),
+        }
+    }
+
+    /// Further terms of its scale there, besides what its variables make of it.
+    fn terms(&self, values: &Values, sample: usize, v: &[f64]) -> Vec<Term> {
+        match &self.law {
+            Law::Sum { .. } | Law::Zero { .. } => Vec::new(),
+            Law::Value { right, .. } => {
+                let mut parts = Vec::new();
+                let terms = Terms::of(values.exprs(), *right, &mut parts);
+                let parts = values.reader(&parts).ok().and_then(|reader| reader.values(sample, &[]));
+                parts.map(|v| Term::beside(Quantity::Number, terms.magnitude(&v))).into_iter().collect()
+            }
+            Law::Product { right: (_, other), .. } => vec![Term::beside(*other, v[0].abs())],
+            Law::Row { right, .. } => {
+                v.iter().zip(right).map(|(factor, (_, other))| Term::beside(*other, factor.abs())).collect()
+            }
+        }
+    }
+}
+
 /// Laws at every sample.
 struct Check<'a, 'b> {
     graph: &'b BondGraph,
@@ -348,89 +428,89 @@ struct Check<'a, 'b> {
     scales: &'b Scales,
     settled: &'b Settled,
     worst: &'b mut Worst,
+    /// How many laws there were.
+    laws: usize,
 }
 
-impl Check<'_, '_> {
-    fn law(&mut self, name: &str, law: &Law) -> Result<(), String> {
-        match law {
+impl<'a, 'b> Check<'a, 'b> {
+    /// Checks a law of columns alone; those with expressions are gathered.
+    fn law(&mut self, name: &'b str, law: Law<'a>, written: &mut Vec<Written<'b, 'a>>) -> Result<(), String> {
+        let parts = match &law {
             Law::Sum { terms, what, of } => {
                 self.sum(name, terms, what, *of);
-                Ok(())
+                return Ok(());
             }
-            Law::Value { left, right, what, of } => {
-                let mut parts = vec![*right];
-                let terms = Terms::of(&self.graph.exprs, *right, &mut parts);
-                let reader = self.values.reader(&parts)?;
-                let miss = |k: usize, v: &[f64]| left[k] - v[0];
-                let more = |_: usize, v: &[f64]| vec![Term::beside(Quantity::Number, terms.magnitude(v))];
-                self.read(name, what, *of, &reader, &miss, &more);
-                Ok(())
-            }
-            Law::Product { left, factor, divisor, right: (right, other), what, of } => {
-                let parts: Vec<Expr> = [*factor].into_iter().chain(*divisor).collect();
-                let reader = self.values.reader(&parts)?;
-                let sum = |k: usize| left.iter().map(|(sign, column)| sign * column[k]).sum::<f64>();
-                let (own, others) = (self.settled.of(*of), self.settled.of(*other));
-                let ratio = if own > 0.0 { others / own } else { 0.0 };
-                let miss = |k: usize, v: &[f64]| match v[1..].first() {
-                    None => sum(k) - v[0] * right[k],
-                    // Where the divisor vanishes, what is divided does.
-                    Some(divisor) => {
-                        (divisor * sum(k) - v[0] * right[k])
-                            / divisor.abs().max(v[0].abs() * ratio).max(f64::MIN_POSITIVE)
-                    }
-                };
-                self.read(name, what, *of, &reader, &miss, &|_, v| vec![Term::beside(*other, v[0].abs())]);
-                Ok(())
-            }
-            Law::Row { left, factors, right, what, of } => {
-                let reader = self.values.reader(factors)?;
-                let miss = |k: usize, v: &[f64]| {
-                    left[k] - v.iter().zip(right).map(|(factor, (column, _))| factor * column[k]).sum::<f64>()
-                };
-                let more = |_: usize, v: &[f64]| {
-                    v.iter().zip(right).map(|(factor, (_, other))| Term::beside(*other, factor.abs())).collect()
-                };
-                self.read(name, what, *of, &reader, &miss, &more);
-                Ok(())
-            }
-            Law::Zero { expr, what } => self.zero(name, *expr, what),
-        }
+            Law::Value { right, .. } => vec![*right],
+            Law::Product { factor, divisor, .. } => [*factor].into_iter().chain(*divisor).collect(),
+            Law::Row { factors, .. } => factors.clone(),
+            Law::Zero { expr, .. } => match self.graph.exprs.node(*expr) {
+                Node::Add(terms) => terms.to_vec(),
+                _ => vec![*expr],
+            },
+        };
+        let reader = self.values.reader(&parts)?;
+        let settled = self.settled;
+        let ratio = match &law {
+            Law::Product { right: (_, other), of, .. } if settled.of(*of) > 0.0 => settled.of(*other) / settled.of(*of),
+            _ => 0.0,
+        };
+        let scale = settled.scale(law.natural().as_slice());
+        self.laws += 1;
+        written.push(Written { name, law, reader, number: self.laws, scale, ratio });
+        Ok(())
     }
 
     fn sum(&mut self, name: &str, terms: &[(f64, &[f64])], what: &str, of: Quantity) {
+        self.laws += 1;
         let natural = vec![Term::of(of, 1.0)];
         let scale = self.settled.scale(&natural);
         for (k, &time) in self.values.times.iter().enumerate() {
             let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
-            self.worst.note(miss, scale, self.settled, || raw(miss, time, name, what, natural.clone()));
+            self.worst.note_of(self.laws, miss, scale, self.settled, || raw(miss, time, name, what, natural.clone()));
         }
     }
 
-    /// A law with an expression; `more` gives further terms of its scale.
-    fn read(
-        &mut self,
-        name: &str,
-        what: &str,
-        of: Quantity,
-        reader: &Reader,
-        miss: &dyn Fn(usize, &[f64]) -> f64,
-        more: &dyn Fn(usize, &[f64]) -> Vec<Term>,
-    ) {
-        let scale = self.settled.scale(&[Term::of(of, 1.0)]);
-        let mut room = Vec::new();
-        for (k, &time) in self.values.times.iter().enumerate().filter(|(k, _)| !reader.is_beyond(*k)) {
-            let Some(found) = reader.values_in(&mut room, k, &[]) else { continue };
-            let off = self.least(reader, k, miss(k, found), |v| miss(k, v));
-            let (graph, scales, settled) = (self.graph, self.scales, self.settled);
-            self.worst.note(off, scale, settled, || {
-                let mut terms = vec![Term::of(of, 1.0)];
-                terms.extend(more(k, found));
-                let all = sensitivities(graph, scales, settled, reader, k, |v| miss(k, v));
-                terms.extend(all.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight)));
-                raw(off, time, name, what, terms)
+    /// Laws with expressions: what they read has much in common.
+    fn written(&mut self, laws: &[Written<'b, 'a>]) {
+        let values = self.values;
+        let (together, alone): (Vec<&Written>, Vec<&Written>) = laws.iter().partition(|law| law.reader.is_at_samples());
+        let readers: Vec<&Reader> = together.iter().map(|law| &law.reader).collect();
+        let all = values.together(&readers);
+        let (samples, mut room) = (values.times.len(), Vec::new());
+        let mut zeros = vec![Vec::new(); together.len()];
+        for from in (0..samples).step_by(AT_ONCE) {
+            all.read(from..samples.min(from + AT_ONCE), &mut room, |law, sample, v| match together[law].law {
+                Law::Zero { .. } => zeros[law].push(v.to_vec()),
+                _ => self.at(together[law], sample, v),
             });
         }
+        together.into_iter().zip(zeros).filter(|law| !law.1.is_empty()).for_each(|(law, found)| self.zero(law, &found));
+        for law in alone {
+            let clear = |sample: &usize| !law.reader.is_unclear(*sample);
+            let found = (0..samples).map(|sample| law.reader.values(sample, &[]).unwrap_or_default());
+            match law.law {
+                Law::Zero { .. } => self.zero(law, &found.collect::<Vec<_>>()),
+                _ => (0..samples).zip(found).filter(|(k, _)| clear(k)).for_each(|(k, v)| self.at(law, k, &v)),
+            }
+        }
+    }
+
+    /// A law that something is measured in, at a sample where its expressions have these values.
+    fn at(&mut self, law: &Written, sample: usize, v: &[f64]) {
+        let reader = &law.reader;
+        if reader.is_beyond(sample) || reader.is_unclear(sample) {
+            return;
+        }
+        let (graph, values, scales, settled) = (self.graph, self.values, self.scales, self.settled);
+        let miss = |v: &[f64]| law.miss(sample, v);
+        let off = self.least(reader, sample, miss(v), miss);
+        self.worst.note_of(law.number, off, law.scale, settled, || {
+            let mut terms: Vec<Term> = law.law.natural().into_iter().collect();
+            terms.extend(law.terms(values, sample, v));
+            let all = sensitivities(graph, scales, settled, reader, sample, miss);
+            terms.extend(all.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight)));
+            raw(off, values.times[sample], law.name, law.law.what(), terms)
+        });
     }
 
     /// What a law is missed by: after a jump, where a condition may stand on its border, in the branch that holds best.
@@ -450,33 +530,27 @@ impl Check<'_, '_> {
             .fold(here, |least, off| if off.abs() < least.abs() { off } else { least })
     }
 
-    /// An expression that vanishes: relative to its terms where it has several, else to what its variables make of it.
-    fn zero(&mut self, name: &str, expr: Expr, what: &str) -> Result<(), String> {
-        let parts = match self.graph.exprs.node(expr) {
-            Node::Add(terms) => terms.to_vec(),
-            _ => vec![expr],
-        };
-        let reader = self.values.reader(&parts)?;
-        let at = |k: usize| reader.values(k, &[]).filter(|_| !reader.is_beyond(k));
-        let found: Vec<Option<Vec<f64>>> = (0..self.values.times.len()).map(at).collect();
+    /// An expression that vanishes: relative to its terms where it has several, else to what its variables make of it. `found` are
+    /// the values of its terms, sample by sample.
+    fn zero(&mut self, law: &Written, found: &[Vec<f64>]) {
+        let (graph, values, scales, settled) = (self.graph, self.values, self.scales, self.settled);
+        let reader = &law.reader;
+        let counts = |sample: &usize| !reader.is_unclear(*sample) && !reader.is_beyond(*sample);
+        let several = found.iter().any(|v| v.len() > 1);
         let size = |v: &Vec<f64>| v.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let greatest = found.iter().flatten().map(size).fold(0.0, f64::max);
-        let natural = if parts.len() > 1 { greatest } else { 0.0 };
-        let scale = self.settled.scale(&[Term::of(Quantity::Number, natural)]);
-        for (k, found) in found.iter().enumerate() {
-            let Some(found) = found else { continue };
-            let (graph, scales, settled) = (self.graph, self.scales, self.settled);
-            let sum = |v: &[f64]| v.iter().sum::<f64>();
-            let off = self.least(&reader, k, sum(found), sum);
-            self.worst.note(off, scale, settled, || {
-                let mut terms = vec![Term::of(Quantity::Number, natural)];
-                let all = sensitivities(graph, scales, settled, &reader, k, sum);
-                let term = |(quantity, weight)| Term { quantity, weight, beside: parts.len() > 1 };
-                terms.extend(all.into_iter().map(term));
-                raw(off, self.values.times[k], name, what, terms)
+        let greatest = (0..found.len()).filter(counts).map(|k| size(&found[k])).fold(0.0, f64::max);
+        let natural = Term::of(Quantity::Number, if several { greatest } else { 0.0 });
+        let scale = settled.scale(&[natural]);
+        for k in (0..found.len()).filter(counts) {
+            let miss = |v: &[f64]| law.miss(k, v);
+            let off = self.least(reader, k, miss(&found[k]), miss);
+            self.worst.note_of(law.number, off, scale, settled, || {
+                let all = sensitivities(graph, scales, settled, reader, k, miss);
+                let term = |(quantity, weight)| Term { quantity, weight, beside: several };
+                let terms = [natural].into_iter().chain(all.into_iter().map(term)).collect();
+                raw(off, values.times[k], law.name, law.law.what(), terms)
             });
         }
-        Ok(())
     }
 }
 

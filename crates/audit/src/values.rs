@@ -2,10 +2,12 @@
 
 use crate::Run;
 use crate::quadrature::Quadrature;
-use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Function, Node, Symbol};
+use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Exprs, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::ids::Table;
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// The names of the variables that an audit reads, as `--record` takes them: all efforts, flows and stored quantities
 /// of elements, junctions and named bonds, integrated signals, inputs and held signals.
@@ -181,24 +183,46 @@ impl<'a> Values<'a> {
         let bent = wanted.iter().any(|&e| self.bends(e, &state));
         let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
         let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
-        let places: BTreeMap<Symbol, usize> = rates.keys().enumerate().map(|(k, s)| (*s, k)).collect();
-        let read = |wanted: &[Expr]| {
-            let order = EvaluationOrder::new(x, wanted);
-            let source = |&s: &Symbol| match (places.get(&s), self.recorded(s)) {
-                _ if s == time => Source::Time,
-                (Some(&rate), _) => Source::Rate(rate),
-                (None, Some(column)) => Source::Column(s, column),
-                (None, None) => Source::Number(self.parameter(s).unwrap_or(f64::NAN)),
-            };
-            Read { sources: order.symbols().iter().map(source).collect(), order }
+        let rates = rates.into_iter().collect();
+        Ok(Reader { values: self, wanted: wanted.to_vec(), rates, read: OnceCell::new(), moves, jumpy, bent, timed })
+    }
+
+    /// Expressions with where their symbols are, all of which are known; those of `rates` by their place there.
+    fn read(&self, wanted: &[Expr], rates: &[(Symbol, Expr)]) -> Read<'a> {
+        let order = EvaluationOrder::new(&self.graph.exprs, wanted);
+        let source = |&s: &Symbol| match (rates.binary_search_by_key(&s, |rate| rate.0), self.recorded(s)) {
+            _ if s == self.graph.time => Source::Time,
+            (Ok(rate), _) => Source::Rate(rate),
+            (Err(_), Some(column)) => Source::Column(s, column),
+            (Err(_), None) => Source::Number(self.parameter(s).unwrap_or(f64::NAN)),
         };
-        let rates = rates.values().map(|&rate| read(&[rate])).collect();
-        Ok(Reader { values: self, wanted: read(wanted), rates, moves, jumpy, bent, timed })
+        Read { sources: order.symbols().iter().map(source).collect(), order }
+    }
+
+    /// What several readers read, evaluated together; those of times beside jumps read by themselves.
+    pub fn together(&self, readers: &[&Reader<'_, 'a>]) -> Together<'_, 'a> {
+        let mut wanted = Vec::new();
+        let mut rates: Vec<(Symbol, Expr)> = Vec::new();
+        let places = readers.iter().map(|reader| {
+            rates.extend(reader.rates.iter().copied());
+            wanted.extend(&reader.wanted);
+            wanted.len() - reader.wanted.len()..wanted.len()
+        });
+        let places = places.collect();
+        rates.sort_unstable();
+        rates.dedup();
+        let read = Reads::new(self, &wanted, &rates);
+        Together { values: self, places, read }
     }
 
     /// The column of a symbol, or of the effort or flow that it is the rate of a stored quantity as.
     fn recorded(&self, symbol: Symbol) -> Option<&'a [f64]> {
         self.column(symbol).or_else(|| self.column(self.same_as(symbol)?))
+    }
+
+    /// The expressions of the graph.
+    pub fn exprs(&self) -> &'a Exprs {
+        &self.graph.exprs
     }
 
     /// All columns by symbol.
@@ -283,9 +307,11 @@ impl<'a> Values<'a> {
 /// Expressions at samples.
 pub(crate) struct Reader<'v, 'a> {
     values: &'v Values<'a>,
-    wanted: Read<'a>,
+    wanted: Vec<Expr>,
     /// Rates of integrated signals among what is read.
-    rates: Vec<Read<'a>>,
+    rates: Vec<(Symbol, Expr)>,
+    /// In what order, made when it is asked for first.
+    read: OnceCell<Reads<'a>>,
     /// Recorded symbols among what is read.
     moves: Vec<Symbol>,
     /// Whether a value jumps with the state, and with time.
@@ -295,10 +321,73 @@ pub(crate) struct Reader<'v, 'a> {
     bent: bool,
 }
 
+/// Expressions with where the values of their symbols are, and rates of integrated signals among these.
+struct Reads<'a> {
+    wanted: Read<'a>,
+    rates: Vec<Read<'a>>,
+}
+
+impl<'a> Reads<'a> {
+    fn new(values: &Values<'a>, wanted: &[Expr], rates: &[(Symbol, Expr)]) -> Reads<'a> {
+        let read = |wanted: &[Expr]| values.read(wanted, rates);
+        Reads { wanted: read(wanted), rates: rates.iter().map(|&(_, rate)| read(&[rate])).collect() }
+    }
+
+    /// The values at samples and times; `column` gives those of a recorded symbol.
+    fn at<'r, const N: usize>(
+        &self,
+        read: &Read<'a>,
+        room: &'r mut Vec<[f64; N]>,
+        t: [f64; N],
+        column: &dyn Fn(Symbol, &'a [f64]) -> [f64; N],
+    ) -> &'r [[f64; N]] {
+        read.order.values_in(room, |k| match read.sources[k] {
+            Source::Time => t,
+            Source::Rate(rate) => self.at(&self.rates[rate], &mut Vec::new(), t, column)[0],
+            Source::Column(symbol, values) => column(symbol, values),
+            Source::Number(number) => [number; N],
+        })
+    }
+}
+
 /// Expressions with where the values of their symbols are.
 struct Read<'a> {
     order: EvaluationOrder<'a>,
     sources: Vec<Source<'a>>,
+}
+
+/// What several readers read: what they have in common is evaluated once, at several samples at once.
+pub(crate) struct Together<'v, 'a> {
+    values: &'v Values<'a>,
+    /// Where the values of each reader stand.
+    places: Vec<Range<usize>>,
+    read: Reads<'a>,
+}
+
+/// Samples that are read at once.
+pub(crate) const AT_ONCE: usize = 8;
+
+impl Together<'_, '_> {
+    /// The values of all readers at up to [`AT_ONCE`] samples: `found(reader, sample, values)`, sample by sample for each reader.
+    pub fn read(
+        &self,
+        samples: Range<usize>,
+        room: &mut Vec<[f64; AT_ONCE]>,
+        mut found: impl FnMut(usize, usize, &[f64]),
+    ) {
+        let last = samples.end - 1;
+        let at: [usize; AT_ONCE] = std::array::from_fn(|i| last.min(samples.start + i));
+        let t = at.map(|sample| self.values.times[sample]);
+        let all = self.read.at(&self.read.wanted, room, t, &|_, column| at.map(|sample| column[sample]));
+        let mut values = Vec::new();
+        for (reader, place) in self.places.iter().enumerate() {
+            for (i, sample) in samples.clone().enumerate() {
+                values.clear();
+                values.extend(all[place.clone()].iter().map(|lanes| lanes[i]));
+                found(reader, sample, &values);
+            }
+        }
+    }
 }
 
 /// How far from a jump in time values are on one side of it for certain.
@@ -333,44 +422,44 @@ impl Reader<'_, '_> {
         self.bent && self.values.is_before_jump(sample)
     }
 
-    /// The values at a sample, symbols moved by so much; `None` where the law is not clear: at a switch the state stands
-    /// just beyond the border while the old law still holds.
+    /// Whether it can be read together with others: at the times of the samples.
+    pub fn is_at_samples(&self) -> bool {
+        !self.timed
+    }
+
+    /// Whether a sample stands before a jump, and a value jumps with the state: there the state stands just beyond the border
+    /// while the old law still holds.
+    pub fn is_unclear(&self, sample: usize) -> bool {
+        self.jumpy && self.values.is_before_jump(sample)
+    }
+
+    /// The values at a sample, symbols moved by so much; `None` where the law is not clear.
     pub fn values(&self, sample: usize, moved: &[(Symbol, f64)]) -> Option<Vec<f64>> {
-        self.values_in(&mut Vec::new(), sample, moved).map(<[f64]>::to_vec)
+        self.values_in(&mut Vec::new(), sample, moved).map(|values| values.iter().map(|&[value]| value).collect())
     }
 
     /// The same in memory that is used again.
-    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, sample: usize, moved: &[(Symbol, f64)]) -> Option<&'r [f64]> {
-        let values = self.values;
-        let side = values.side(sample);
-        if self.jumpy && side == Side::Before {
+    pub fn values_in<'r>(
+        &self,
+        room: &'r mut Vec<[f64; 1]>,
+        sample: usize,
+        moved: &[(Symbol, f64)],
+    ) -> Option<&'r [[f64; 1]]> {
+        if self.is_unclear(sample) {
             return None;
         }
+        let values = self.values;
         let t = values.times[sample];
-        let t = match side {
+        let t = match values.side(sample) {
             // A run that ends at a jump stands before it.
             Side::Before | Side::Inside if self.timed => t - reach(t),
             Side::After if self.timed => t + reach(t),
             _ => t,
         };
-        Some(self.read(&self.wanted, room, sample, t, moved))
-    }
-
-    fn read<'r>(
-        &self,
-        read: &Read,
-        room: &'r mut Vec<f64>,
-        sample: usize,
-        t: f64,
-        moved: &[(Symbol, f64)],
-    ) -> &'r [f64] {
-        read.order.values_in(room, |k| match read.sources[k] {
-            Source::Time => t,
-            Source::Rate(rate) => self.read(&self.rates[rate], &mut Vec::new(), sample, t, moved)[0],
-            Source::Column(symbol, column) => {
-                moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)
-            }
-            Source::Number(number) => number,
-        })
+        let read = self.read.get_or_init(|| Reads::new(values, &self.wanted, &self.rates));
+        let column = |symbol: Symbol, column: &[f64]| {
+            [moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)]
+        };
+        Some(read.at(&read.wanted, room, [t], &column))
     }
 }

@@ -32,24 +32,36 @@ impl Raw {
 pub(crate) struct Worst {
     parts: Vec<Raw>,
     now: Option<(Finding, Raw)>,
+    /// Which law that is of.
+    law: usize,
 }
 
 impl Worst {
     /// Takes note of a miss. `scale` is the least that it counts relative to; `raw`, which has all its terms, is asked for only
     /// where it would stand out.
     pub fn note(&mut self, miss: f64, scale: Scale, settled: &Settled, raw: impl FnOnce() -> Raw) {
+        self.note_of(usize::MAX, miss, scale, settled, raw);
+    }
+
+    /// The same for a law of this number: of equal misses that of the first law stays, whichever is seen first.
+    pub fn note_of(&mut self, law: usize, miss: f64, scale: Scale, settled: &Settled, raw: impl FnOnce() -> Raw) {
         let value = scale.relative(miss);
-        let above = |now: &Finding| !now.value.is_nan() && (value > now.value || value.is_nan());
-        if self.now.as_ref().is_none_or(|(now, _)| above(now)) {
-            self.keep(raw(), settled);
+        let above = |now: &Finding| value > now.value || value.is_nan() || (value == now.value && law < self.law);
+        if self.now.as_ref().is_none_or(|(now, _)| !now.value.is_nan() && above(now)) {
+            self.keep_of(law, raw(), settled);
         }
     }
 
     /// Keeps a miss if it stands out most above what the samples resolve.
     pub fn keep(&mut self, raw: Raw, settled: &Settled) {
+        self.keep_of(usize::MAX, raw, settled);
+    }
+
+    fn keep_of(&mut self, law: usize, raw: Raw, settled: &Settled) {
         let found = raw.measured(settled);
-        if self.now.as_ref().is_none_or(|(now, _)| above(pair(&found), pair(now))) {
-            self.now = Some((found, raw));
+        let first = |now: &Finding| pair(&found) == pair(now) && law < self.law;
+        if self.now.as_ref().is_none_or(|(now, _)| above(pair(&found), pair(now)) || first(now)) {
+            (self.now, self.law) = (Some((found, raw)), law);
         }
     }
 

@@ -49,7 +49,7 @@ impl<'a> Evaluator<'a> {
         for part in self.pool.below(&[e], &|e| !values.contains_key(&e)) {
             let value = match self.pool.node(part) {
                 Node::Symbol(s) => (self.symbols)(*s),
-                node => node_value(self.pool, node, |_, part| self.values[&part]),
+                node => node_value(self.pool, node, |_, part| [self.values[&part]])[0],
             };
             self.values.insert(part, value);
         }
@@ -120,15 +120,21 @@ impl<'a> EvaluationOrder<'a> {
 
     /// Their values at given values of symbols; NaN where one is not defined. Each symbol is asked for once.
     pub fn values(&self, symbols: &mut dyn FnMut(Symbol) -> f64) -> Vec<f64> {
-        self.values_in(&mut Vec::new(), |k| symbols(self.symbols[k])).to_vec()
+        let mut room = Vec::new();
+        self.values_in(&mut room, |k| [symbols(self.symbols[k])]).iter().map(|&[value]| value).collect()
     }
 
-    /// The same in memory that is used again, with each symbol by its place among [`symbols`](Self::symbols).
-    pub fn values_in<'r>(&self, room: &'r mut Vec<f64>, mut symbol: impl FnMut(usize) -> f64) -> &'r [f64] {
+    /// The same at `N` points at once in memory that is used again, with each symbol by its place among
+    /// [`symbols`](Self::symbols). The bits do not depend on how many points there are.
+    pub fn values_in<'r, const N: usize>(
+        &self,
+        room: &'r mut Vec<[f64; N]>,
+        mut symbol: impl FnMut(usize) -> [f64; N],
+    ) -> &'r [[f64; N]] {
         room.clear();
         for evaluated in &self.order {
             let value = match *evaluated {
-                Evaluated::Number(number) => number,
+                Evaluated::Number(number) => [number; N],
                 Evaluated::Symbol(k) => symbol(k),
                 Evaluated::Node(node, first) => {
                     node_value(self.pool, node, |k, _| room[self.parts[first + k] as usize])
@@ -171,42 +177,47 @@ impl Exprs {
     }
 }
 
-fn truth(value: bool) -> f64 {
-    if value { 1.0 } else { 0.0 }
-}
-
-/// The value of a node that is no symbol from the values of its parts, each asked for by its place among them and itself.
-fn node_value(pool: &Exprs, node: &Node, at: impl Fn(usize, Expr) -> f64) -> f64 {
+/// The values of a node that is no symbol at `N` points from the values of its parts, each asked for by its place among them
+/// and itself.
+fn node_value<const N: usize>(pool: &Exprs, node: &Node, at: impl Fn(usize, Expr) -> [f64; N]) -> [f64; N] {
+    let truth = |a: [f64; N], b: [f64; N], holds: &dyn Fn(f64, f64) -> bool| zip(a, b, |a, b| f64::from(holds(a, b)));
+    let joined = |parts: &[Expr], start: f64, join: fn(f64, f64) -> f64| {
+        parts.iter().enumerate().fold([start; N], |all, (k, &part)| zip(all, at(k, part), join))
+    };
     match node {
-        Node::Number(value) => value.to_f64(),
-        Node::Pi => std::f64::consts::PI,
-        Node::Symbol(_) => f64::NAN,
-        Node::Add(terms) => terms.iter().enumerate().map(|(k, &t)| at(k, t)).sum(),
-        Node::Mul(factors) => factors.iter().enumerate().map(|(k, &f)| at(k, f)).product(),
+        Node::Number(value) => [value.to_f64(); N],
+        Node::Pi => [std::f64::consts::PI; N],
+        Node::Symbol(_) => [f64::NAN; N],
+        Node::Add(terms) => joined(terms, -0.0, |a, b| a + b),
+        Node::Mul(factors) => joined(factors, 1.0, |a, b| a * b),
         Node::Pow(base, n) => power(at(0, *base), pool.is_number(*n).and_then(|n| n.small()), at(1, *n)),
-        Node::Call(f, x) => f.value(at(0, x[0]), x.get(1).map_or(0.0, |&y| at(1, y))),
-        Node::Compare(c, a, b) => truth(c.holds(&at(0, *a), &at(1, *b))),
-        Node::And(a, b) => truth(at(0, *a) != 0.0 && at(1, *b) != 0.0),
-        Node::Or(a, b) => truth(at(0, *a) != 0.0 || at(1, *b) != 0.0),
-        Node::Not(a) => truth(at(0, *a) == 0.0),
+        Node::Call(f, x) => match x.get(1) {
+            Some(&y) => zip(at(0, x[0]), at(1, y), |x, y| f.value(x, y)),
+            None => math::call_lanes(*f, &at(0, x[0])),
+        },
+        Node::Compare(c, a, b) => truth(at(0, *a), at(1, *b), &|a, b| c.holds(&a, &b)),
+        Node::And(a, b) => truth(at(0, *a), at(1, *b), &|a, b| a != 0.0 && b != 0.0),
+        Node::Or(a, b) => truth(at(0, *a), at(1, *b), &|a, b| a != 0.0 || b != 0.0),
+        Node::Not(a) => at(0, *a).map(|a| f64::from(a == 0.0)),
         Node::Select(c, a, b) => {
-            if at(0, *c) != 0.0 {
-                at(1, *a)
-            } else {
-                at(2, *b)
-            }
+            let (c, a, b) = (at(0, *c), at(1, *a), at(2, *b));
+            std::array::from_fn(|i| if c[i] != 0.0 { a[i] } else { b[i] })
         }
-        Node::Table(t, x) => pool.table1d(*t).value(at(0, *x)),
-        Node::TableSlope(t, x) => pool.table1d(*t).slope(at(0, *x)),
+        Node::Table(t, x) => at(0, *x).map(|x| pool.table1d(*t).value(x)),
+        Node::TableSlope(t, x) => at(0, *x).map(|x| pool.table1d(*t).slope(x)),
         Node::Whole(a) => at(0, *a),
     }
 }
 
-fn power(base: f64, exact: Option<(i64, i64)>, n: f64) -> f64 {
+fn zip<const N: usize>(a: [f64; N], b: [f64; N], join: impl Fn(f64, f64) -> f64) -> [f64; N] {
+    std::array::from_fn(|i| join(a[i], b[i]))
+}
+
+fn power<const N: usize>(base: [f64; N], exact: Option<(i64, i64)>, n: [f64; N]) -> [f64; N] {
     match exact {
-        Some((n, 1)) => math::whole_power(base, n),
-        Some((1, 2)) => Function::Sqrt.value(base, 0.0),
-        Some((-1, 2)) => 1.0 / base.sqrt(),
-        _ => math::pow(base, n),
+        Some((n, 1)) => base.map(|base| math::whole_power(base, n)),
+        Some((1, 2)) => base.map(|base| Function::Sqrt.value(base, 0.0)),
+        Some((-1, 2)) => base.map(|base| 1.0 / base.sqrt()),
+        _ => math::pow_lanes(&base, &n),
     }
 }
