@@ -44,6 +44,15 @@ pub(super) enum ChunkItem<'a> {
 }
 
 impl ChunkItem<'_> {
+    /// The registers that it writes.
+    pub fn written(&self) -> &[Register] {
+        match self {
+            ChunkItem::Op(operation) => std::slice::from_ref(&operation.out),
+            ChunkItem::Guard { .. } => &[],
+            ChunkItem::Solve(solve) => &solve.unknowns,
+        }
+    }
+
     /// Whether it may stop the run, or ask for the bytecode; `inline`: functions are written out.
     pub fn may_fail(&self, inline: bool) -> bool {
         match self {
@@ -71,8 +80,13 @@ pub(super) struct Chunk<'a, 'b> {
     keep: Value,
     r: BTreeMap<Register, Value>,
     d: BTreeMap<Register, Value>,
-    /// Registers that are stored as soon as they are written: nothing in the chunk can go wrong.
-    at_once: BTreeSet<Register>,
+    /// Registers that are stored as soon as they are written, with the item that writes them last: nothing in the chunk can go
+    /// wrong.
+    at_once: BTreeMap<Register, usize>,
+    /// Registers that the chunk writes: what stands in others does not change while it runs.
+    written: BTreeSet<Register>,
+    /// How many items there were.
+    items: usize,
     /// Registers that are only read: loaded again after a call rather than saved over it.
     loaded: BTreeSet<Register>,
     /// 0, or the first thing that is wrong.
@@ -108,7 +122,9 @@ impl<'a, 'b> Chunk<'a, 'b> {
             keep,
             r: BTreeMap::new(),
             d: BTreeMap::new(),
-            at_once: BTreeSet::new(),
+            at_once: BTreeMap::new(),
+            written: BTreeSet::new(),
+            items: 0,
             loaded: BTreeSet::new(),
             status: None,
             good: None,
@@ -124,23 +140,30 @@ impl<'a, 'b> Chunk<'a, 'b> {
         self.direct = Some(direct);
     }
 
-    /// From now on these registers are stored as soon as they are written, so that no value waits for the end.
-    pub fn stores_at_once(&mut self, registers: &[Register]) {
-        self.at_once.extend(registers);
+    /// These registers are stored as soon as the last item has written them, so that no value waits for the end.
+    pub fn stores_at_once(&mut self, registers: &[Register], items: &[ChunkItem]) {
+        for (at, item) in items.iter().enumerate() {
+            let kept = item.written().iter().filter(|register| registers.binary_search(register).is_ok());
+            self.at_once.extend(kept.map(|&register| (register, at)));
+        }
     }
 
-    pub fn item(&mut self, item: ChunkItem) {
-        match item {
-            ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
-            ChunkItem::Guard { pivot, scale, guard } => self.guard(pivot, scale, guard),
-            ChunkItem::Solve(solve) => self.solve(solve),
+    pub fn items(&mut self, items: &[ChunkItem]) {
+        self.written.extend(items.iter().flat_map(ChunkItem::written));
+        for item in items {
+            match *item {
+                ChunkItem::Op(&Operation { out, op }) => self.operation(out, op),
+                ChunkItem::Guard { pivot, scale, guard } => self.guard(pivot, scale, guard),
+                ChunkItem::Solve(solve) => self.solve(solve),
+            }
+            self.items += 1;
         }
     }
 
     /// Stores registers that it has written unless something is wrong or unusual, and returns the status.
     pub fn end(mut self, written: &[Register]) -> Writer<'a> {
         self.stop_unless_fine();
-        for register in written.iter().filter(|r| !self.at_once.contains(r)).copied() {
+        for register in written.iter().filter(|r| !self.at_once.contains_key(r)).copied() {
             let value = self.r[&register];
             self.w.store(self.values, register, value);
             if let Some(&slope) = self.d.get(&register).filter(|_| self.along) {
@@ -199,7 +222,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
                 let (base, index) = (direct.states.1, register - direct.states.0.start);
                 self.w.load_fixed(base, index)
             }
-            _ if register < self.context.states.end => self.w.load_fixed(self.values, register),
+            _ if !self.written.contains(&register) => self.w.load_fixed(self.values, register),
             _ => self.w.load(self.values, register),
         };
         self.r.insert(register, value);
@@ -214,7 +237,10 @@ impl<'a, 'b> Chunk<'a, 'b> {
         if let Some(&known) = self.d.get(&register) {
             return known;
         }
-        let slope = self.w.load(self.derivatives, register);
+        let slope = match self.written.contains(&register) {
+            false => self.w.load_fixed(self.derivatives, register),
+            true => self.w.load(self.derivatives, register),
+        };
         self.d.insert(register, slope);
         self.loaded.insert(register);
         slope
@@ -224,7 +250,7 @@ impl<'a, 'b> Chunk<'a, 'b> {
         let slope = self.along.then(|| slope(self));
         self.loaded.remove(&register);
         self.r.insert(register, value);
-        let at_once = self.at_once.contains(&register);
+        let at_once = self.at_once.get(&register) == Some(&self.items);
         if at_once {
             self.w.store(self.values, register, value);
         }

@@ -100,9 +100,9 @@ impl Maker {
                 let parameters = std::array::from_fn(|i| arguments[i]);
                 let mut chunk = Chunk::new(writer, parameters, context, plan.along, plan.inline);
                 if !plan.items.iter().any(|item| item.may_fail(plan.inline)) {
-                    chunk.stores_at_once(registers);
+                    chunk.stores_at_once(registers, &plan.items);
                 }
-                plan.items.iter().for_each(|&item| chunk.item(item));
+                chunk.items(&plan.items);
                 chunk.end(registers)
             }),
             Ends::Rates(outputs) => {
@@ -114,7 +114,7 @@ impl Maker {
                     let mut chunk = Chunk::new(writer, parameters, context, plan.along, plan.inline);
                     let (time, states) = ((context.time, t), (context.states.clone(), x));
                     chunk.reads_directly(Direct { time, states, rates: dx });
-                    plan.items.iter().for_each(|&item| chunk.item(item));
+                    chunk.items(&plan.items);
                     chunk.end_with_rates(outputs)
                 })
             }

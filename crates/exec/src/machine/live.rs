@@ -16,14 +16,7 @@ impl Live {
 
     /// Goes back over some code; what it writes that is read behind it, in order.
     pub fn before_all(&mut self, items: &[ChunkItem]) -> Vec<Register> {
-        let mut written = Vec::with_capacity(items.len());
-        for item in items {
-            match item {
-                ChunkItem::Op(operation) => written.push(operation.out),
-                ChunkItem::Guard { .. } => {}
-                ChunkItem::Solve(solve) => written.extend(&solve.unknowns),
-            }
-        }
+        let mut written: Vec<Register> = items.iter().flat_map(ChunkItem::written).copied().collect();
         written.retain(|&register| self.holds(register));
         written.sort_unstable();
         written.dedup();
