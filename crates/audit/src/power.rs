@@ -25,10 +25,18 @@ pub(crate) fn power(
         }
     }
     for ports in ports.values() {
-        let mut misses = vec![-0.0; values.times.len()];
+        let natural = Term::of(scales.power(graph, ports[0]), 1.0);
+        let (mut misses, mut all) =
+            (vec![-0.0; values.times.len()], vec![settled.scale(&[natural]); values.times.len()]);
         let missing = ports.iter().find(|&&port| {
             let power = values.power(port);
             power.iter().flatten().zip(&mut misses).for_each(|(power, sum)| *sum += power);
+            let bond = graph.bond_of(port);
+            for flow in [false, true] {
+                let weights = if flow { values.effort(bond) } else { values.flow(bond) }.unwrap_or_default();
+                let own = settled.scale(&[Term::of(scales.of_bond(bond, flow), 1.0)]);
+                weights.iter().zip(&mut all).for_each(|(weight, scale)| *scale = scale.beside(weight.abs(), own));
+            }
             power.is_none()
         });
         if let Some(port) = missing {
@@ -37,10 +45,8 @@ pub(crate) fn power(
             continue;
         }
         let place = format!("the part with {}", graph.elements[ports[0].element].name);
-        let natural = Term::of(scales.power(graph, ports[0]), 1.0);
-        let scale = settled.scale(&[natural]);
         for (sample, (&time, &miss)) in values.times.iter().zip(&misses).enumerate() {
-            worst.note(miss, scale, settled, || {
+            worst.note(miss, all[sample], settled, || {
                 let mut terms = vec![natural];
                 ports.iter().for_each(|&port| terms.extend(changes(graph, values, scales, port, sample)));
                 Raw { miss, resolution: 0.0, time, place: place.clone(), terms }

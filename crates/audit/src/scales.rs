@@ -421,7 +421,7 @@ pub(crate) struct Settled {
 }
 
 /// What a miss is measured with.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Scale {
     own: f64,
     beside: f64,
@@ -462,6 +462,11 @@ impl Settled {
 }
 
 impl Scale {
+    /// The scale of what also stands beside so much of a quantity whose scale alone is `other`.
+    pub fn beside(self, weight: f64, other: Scale) -> Scale {
+        Scale { own: self.own.max(FLOOR * weight * other.own), beside: self.beside.max(weight * other.beside) }
+    }
+
     /// The miss as a part of what is there: what rounding may make of it as a part of what stands beside it.
     pub fn relative(self, miss: f64) -> f64 {
         let miss = miss.abs();

@@ -5,7 +5,8 @@ use crate::quadrature::Quadrature;
 use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Exprs, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::ids::Table;
-use std::cell::OnceCell;
+use rustc_hash::FxHashMap;
+use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -60,6 +61,31 @@ enum Side {
     Inside,
 }
 
+/// Borders in an expression, where its value jumps or has a kink.
+#[derive(Debug, Clone, Copy, Default)]
+struct Borders {
+    /// Whether time moves it, and whether what is recorded does.
+    by_time: bool,
+    by_state: bool,
+    /// Whether it jumps where what is recorded crosses a border, and whether it has a kink there.
+    jumps: bool,
+    bends: bool,
+    /// Whether it jumps at some time.
+    timed: bool,
+}
+
+impl Borders {
+    fn or(self, other: Borders) -> Borders {
+        Borders {
+            by_time: self.by_time || other.by_time,
+            by_state: self.by_state || other.by_state,
+            jumps: self.jumps || other.jumps,
+            bends: self.bends || other.bends,
+            timed: self.timed || other.timed,
+        }
+    }
+}
+
 /// Recorded values by symbol, with what the junctions say of unnamed bonds between them.
 pub(crate) struct Values<'a> {
     graph: &'a BondGraph,
@@ -72,6 +98,8 @@ pub(crate) struct Values<'a> {
     flows: Table<BondId, Option<&'a [f64]>>,
     /// Columns that say the same as that of a symbol, with their names.
     pub same: Vec<(String, Symbol, &'a [f64], &'a [f64])>,
+    /// Borders in expressions, as far as they are known.
+    borders: RefCell<FxHashMap<Expr, Borders>>,
 }
 
 impl<'a> Values<'a> {
@@ -120,6 +148,7 @@ impl<'a> Values<'a> {
             efforts,
             flows,
             same,
+            borders: RefCell::default(),
         }
     }
 
@@ -177,11 +206,7 @@ impl<'a> Values<'a> {
         if let Some(missing) = read.iter().find(|s| !known(s)) {
             return Err(x.name(*missing).to_string());
         }
-        let time = self.graph.time;
-        let state = |s: Symbol| s != time && !self.parameters.contains_key(&s);
-        let jumpy = wanted.iter().any(|&e| self.jumps(e, &state));
-        let bent = wanted.iter().any(|&e| self.bends(e, &state));
-        let timed = wanted.iter().any(|&e| self.jumps(e, &|s| s == time));
+        let Borders { jumps: jumpy, bends: bent, timed, .. } = self.borders(wanted);
         let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
         let rates = rates.into_iter().collect();
         Ok(Reader { values: self, wanted: wanted.to_vec(), rates, read: OnceCell::new(), moves, jumpy, bent, timed })
@@ -251,38 +276,31 @@ impl<'a> Values<'a> {
         self.side(sample) == Side::Before
     }
 
-    /// Whether an expression jumps where something for which `moves` holds crosses a border.
-    fn jumps(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
-        let jumps = |node: &Node| match node {
-            Node::Compare(..) | Node::Table(..) | Node::TableSlope(..) => true,
-            Node::Call(function, _) => matches!(function, Function::Sign | Function::Floor | Function::Mod),
-            _ => false,
-        };
-        self.has_part(e, &jumps, moves)
-    }
-
-    /// Whether an expression has a kink there.
-    fn bends(&self, e: Expr, moves: &dyn Fn(Symbol) -> bool) -> bool {
-        let bends = |node: &Node| matches!(node, Node::Call(Function::Min | Function::Max | Function::Abs, _));
-        self.has_part(e, &bends, moves)
-    }
-
-    /// Whether there is such a part in an expression that something moves.
-    fn has_part(&self, e: Expr, is_such: &dyn Fn(&Node) -> bool, moves: &dyn Fn(Symbol) -> bool) -> bool {
-        let x = &self.graph.exprs;
-        let varies = |e: Expr| x.symbols_of(e).into_iter().any(moves);
-        let (mut open, mut seen) = (vec![e], BTreeSet::from([e]));
-        while let Some(e) = open.pop() {
-            if is_such(x.node(e)) && varies(e) {
-                return true;
+    /// What borders there are in any of these expressions.
+    fn borders(&self, wanted: &[Expr]) -> Borders {
+        let (x, mut known) = (&self.graph.exprs, self.borders.borrow_mut());
+        for part in x.below(wanted, &|e| !known.contains_key(&e)) {
+            let node = x.node(part);
+            let mut found = Borders::default();
+            if let Node::Symbol(s) = node {
+                (found.by_time, found.by_state) = match *s {
+                    time if time == self.graph.time => (true, false),
+                    s => (false, !self.parameters.contains_key(&s)),
+                };
             }
-            x.node(e).for_each_child(|c| {
-                if seen.insert(c) {
-                    open.push(c);
-                }
-            });
+            node.for_each_child(|child| found = found.or(known[&child]));
+            let jumps = match node {
+                Node::Compare(..) | Node::Table(..) | Node::TableSlope(..) => true,
+                Node::Call(function, _) => matches!(function, Function::Sign | Function::Floor | Function::Mod),
+                _ => false,
+            };
+            found.jumps |= jumps && found.by_state;
+            found.timed |= jumps && found.by_time;
+            let bends = matches!(node, Node::Call(Function::Min | Function::Max | Function::Abs, _));
+            found.bends |= bends && found.by_state;
+            known.insert(part, found);
         }
-        false
+        wanted.iter().fold(Borders::default(), |all, e| all.or(known[e]))
     }
 
     /// What a rate is: the expression of an integrated signal.

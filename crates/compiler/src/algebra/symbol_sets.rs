@@ -221,7 +221,7 @@ impl Exprs {
     }
 
     /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept.
-    pub(crate) fn below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> Vec<Expr> {
+    pub fn below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> Vec<Expr> {
         let mut seen: FxHashSet<Expr> = roots.iter().copied().filter(|&r| keep(r)).collect();
         let mut open: Vec<Expr> = seen.iter().copied().collect();
         while let Some(e) = open.pop() {
