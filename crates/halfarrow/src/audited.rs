@@ -1,11 +1,15 @@
 //! A sink that records every step for the audit.
 
+mod beside;
+
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::rc::Rc;
+use std::sync::Arc;
 
-use halfarrow_audit::{self as audit, Audit, Auditor, Finding, wanted};
+use beside::{Auditing as Auditor, Part, Recorded, look};
+use halfarrow_audit::{self as audit, Audit, Finding, wanted};
 use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
 use halfarrow_exec as exec;
 use halfarrow_sim::{
@@ -72,11 +76,11 @@ pub struct Audited<'a, M> {
 
 /// What is recorded.
 struct Book {
-    auditor: Auditor,
+    /// Taken out where it is handed on.
+    auditor: Option<Auditor>,
     /// What the method was allowed to neglect of each state, as far as it said so.
     neglected: Vec<f64>,
-    parameters: BTreeMap<String, f64>,
-    names: Vec<String>,
+    recorded: Arc<Recorded>,
     times: Vec<f64>,
     /// The values of all names at each time, one time after the other.
     samples: Vec<f64>,
@@ -104,19 +108,19 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         // Every name is known to have a value, so this cannot fail.
         let _ = model.record(&all);
         let known = graph.parameters.values().map(|p| p.name.clone());
+        let parameters = known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect();
         let (suspects, sources) = suspects(graph, &names);
         let book = Book {
-            parameters: known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect(),
+            recorded: Arc::new(Recorded { parameters, names: names.clone() }),
             shown: (names.len()..count).collect(),
             samples: Vec::new(),
             times: Vec::new(),
-            auditor: Auditor::new(graph),
+            auditor: Some(Auditor::Here(Box::new(audit::Auditor::new(graph)))),
             neglected: Vec::new(),
             suspects,
             sources,
             infinite: BTreeMap::new(),
             out: Vec::new(),
-            names,
         };
         Audited { model, book }
     }
@@ -128,10 +132,13 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
 
     /// What was found.
     pub fn finish(mut self) -> AuditReport {
+        let mut auditor = self.book.auditor.take().expect("it is handed back").into_auditor();
         let tracked = self.model.program().tracked.iter();
-        tracked.zip(&self.book.neglected).for_each(|(&symbol, error)| self.book.auditor.neglect(symbol, *error));
-        self.book.audit();
-        AuditReport::from(self.book.auditor.finish())
+        tracked.zip(&self.book.neglected).for_each(|(&symbol, error)| auditor.neglect(symbol, *error));
+        if let Some(last) = self.book.part() {
+            look(&mut auditor, &self.book.recorded, &last);
+        }
+        AuditReport::from(auditor.finish())
     }
 
     /// What is to be known of the values recorded, given why the run stopped, if it did.
@@ -213,33 +220,33 @@ impl Book {
             return Err(Failure::NotFinite { time: t, what: Affected::variable(what.to_string()) });
         }
         // A part of the run never ends between the two samples of a jump.
-        let chunk = (KEPT / self.names.len().max(1)).clamp(LEAST, CHUNK);
+        let chunk = (KEPT / self.recorded.names.len().max(1)).clamp(LEAST, CHUNK);
         if self.times.len() >= chunk && self.times.last() != Some(&t) {
             self.audit();
         }
         self.times.push(t);
-        self.samples.extend_from_slice(&values[..self.names.len()]);
+        self.samples.extend_from_slice(&values[..self.recorded.names.len()]);
         Ok(())
     }
 
     /// A value of the graph that is not finite, of a source if there is one.
     fn not_finite(&self, values: &[f64]) -> Option<&str> {
-        if values[..self.names.len()].iter().all(|value| value.is_finite()) {
+        if values[..self.recorded.names.len()].iter().all(|value| value.is_finite()) {
             return None;
         }
         let found = self.suspects.iter().find(|&&i| !values[i].is_finite());
-        found.map(|&i| self.names[i].as_str())
+        found.map(|&i| self.recorded.names[i].as_str())
     }
 
     /// A value that is beyond all it is for half of the time by this factor at its greatest: its name, what it is then, when.
     fn grown(&self, among: &[usize], factor: f64) -> Option<(&str, f64, f64)> {
         among.iter().find_map(|&i| {
-            let column: Vec<f64> = self.samples.iter().skip(i).step_by(self.names.len()).copied().collect();
+            let column: Vec<f64> = self.samples.iter().skip(i).step_by(self.recorded.names.len()).copied().collect();
             let peak = (0..column.len()).max_by(|&a, &b| column[a].abs().total_cmp(&column[b].abs()))?;
             let usual = self.usual(&column);
             let grew = usual > 0.0 && column[peak].abs() > factor * usual;
             (grew && (factor < POLE || self.is_sharp(&column, peak)))
-                .then(|| (self.names[i].as_str(), column[peak], self.times[peak]))
+                .then(|| (self.recorded.names[i].as_str(), column[peak], self.times[peak]))
         })
     }
 
@@ -278,30 +285,20 @@ impl Book {
 
     /// Audits what has been recorded, and keeps the last sample to go on from.
     fn audit(&mut self) {
-        if self.times.len() < 2 {
-            return;
+        if let Some(part) = self.part() {
+            self.samples.reserve(part.samples.len());
+            self.auditor = self.auditor.take().map(|auditor| auditor.take(&self.recorded, part));
         }
-        let columns = turned(&self.samples, self.names.len());
-        let columns = self.names.iter().cloned().zip(columns.chunks(self.times.len())).collect();
-        self.auditor.take(&audit::Run { times: &self.times, columns: &columns, parameters: &self.parameters });
-        let last = self.times.len() - 1;
-        self.times.drain(..last);
-        self.samples.drain(..last * self.names.len());
     }
-}
 
-/// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.
-fn turned(rows: &[f64], columns: usize) -> Vec<f64> {
-    let (count, side) = (rows.len() / columns.max(1), 32);
-    let mut all = vec![0.0; rows.len()];
-    for (row, column) in (0..count).step_by(side).flat_map(|r| (0..columns).step_by(side).map(move |c| (r, c))) {
-        for i in row..count.min(row + side) {
-            for j in column..columns.min(column + side) {
-                all[j * count + i] = rows[i * columns + j];
-            }
-        }
+    /// What has been recorded since the last part, from its last sample on, which is kept.
+    fn part(&mut self) -> Option<Part> {
+        let last = self.times.len().checked_sub(1).filter(|&last| last > 0)?;
+        let kept = self.samples[last * self.recorded.names.len()..].to_vec();
+        let now = self.times[last];
+        let times = std::mem::replace(&mut self.times, vec![now]);
+        Some(Part { times, samples: std::mem::replace(&mut self.samples, kept) })
     }
-    all
 }
 
 impl Audited<'_, exec::Model> {
@@ -311,7 +308,8 @@ impl Audited<'_, exec::Model> {
     /// As [`simulate`].
     #[allow(clippy::result_large_err, reason = "a run fails once")]
     pub fn simulate(&mut self, options: &Options, x: &mut [f64], sink: &mut dyn Sink) -> Result<Summary, Stopped> {
-        let (first, recorded, count) = (self.book.names.len(), self.model.observed(), self.model.varied_by().len());
+        let (first, recorded, count) =
+            (self.book.recorded.names.len(), self.model.observed(), self.model.varied_by().len());
         self.book.shown.extend(recorded..recorded + count * (recorded - first));
         let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
         if count == 0 {
@@ -339,7 +337,7 @@ impl Audited<'_, exec::Model> {
         x: &mut [f64],
         sink: &mut dyn Sink,
     ) -> Result<(Summary, exec::Tape, usize), Stopped> {
-        let first = self.book.names.len();
+        let first = self.book.recorded.names.len();
         let mut sink = Auditing { book: &mut self.book, sink, rtol: options.rtol };
         let mut taped = exec::Taped::new(self.model);
         let mut sink = Numbering { sink: &mut sink, observations: taped.observations(), sampled: Vec::new() };

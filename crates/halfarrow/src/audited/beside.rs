@@ -1,0 +1,101 @@
+//! The audit of one part of a run while the next one is computed.
+
+use std::collections::BTreeMap;
+use std::panic::resume_unwind;
+use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::{Builder, JoinHandle};
+
+use halfarrow_audit::{Auditor, Run};
+
+/// A part of a run, as it was recorded.
+pub struct Part {
+    pub times: Vec<f64>,
+    /// The values of all names at each time, one time after the other.
+    pub samples: Vec<f64>,
+}
+
+/// What the numbers of all parts are.
+pub struct Recorded {
+    pub names: Vec<String>,
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// An auditor, here or in a thread of its own; the parts come to it in order, so that what it finds does not depend on where.
+pub enum Auditing {
+    Here(Box<Auditor>),
+    Beside(SyncSender<Part>, JoinHandle<Option<Box<Auditor>>>),
+}
+
+impl Auditing {
+    /// Looks at a part that another one follows; at most one waits.
+    pub fn take(self, recorded: &Arc<Recorded>, part: Part) -> Auditing {
+        match self.moved(recorded) {
+            Auditing::Here(mut auditor) => {
+                look(&mut auditor, recorded, &part);
+                Auditing::Here(auditor)
+            }
+            Auditing::Beside(sender, thread) => {
+                // A thread that is gone has panicked: that is told where the auditor is asked for.
+                let _ = sender.send(part);
+                Auditing::Beside(sender, thread)
+            }
+        }
+    }
+
+    /// The auditor, when it has looked at all parts.
+    pub fn into_auditor(self) -> Box<Auditor> {
+        match self {
+            Auditing::Here(auditor) => auditor,
+            Auditing::Beside(sender, thread) => {
+                drop(sender);
+                let auditor = thread.join().unwrap_or_else(|panic| resume_unwind(panic));
+                auditor.expect("the auditor is handed over before the first part")
+            }
+        }
+    }
+
+    /// The same in a thread of its own, where there are threads and this is none of several that have work of their own.
+    fn moved(self, recorded: &Arc<Recorded>) -> Auditing {
+        let Auditing::Here(auditor) = self else { return self };
+        if cfg!(target_family = "wasm") || rayon::current_thread_index().is_some() {
+            return Auditing::Here(auditor);
+        }
+        let (hand, handed) = sync_channel::<Box<Auditor>>(1);
+        let (sender, parts) = sync_channel::<Part>(1);
+        let recorded = recorded.clone();
+        let audit = move || {
+            let mut auditor = handed.recv().ok()?;
+            parts.iter().for_each(|part| look(&mut auditor, &recorded, &part));
+            Some(auditor)
+        };
+        match Builder::new().name("audit".to_string()).spawn(audit) {
+            Ok(thread) => match hand.send(auditor) {
+                Ok(()) => Auditing::Beside(sender, thread),
+                Err(back) => Auditing::Here(back.0),
+            },
+            Err(_) => Auditing::Here(auditor),
+        }
+    }
+}
+
+/// Looks at a part.
+pub fn look(auditor: &mut Auditor, recorded: &Recorded, part: &Part) {
+    let columns = turned(&part.samples, recorded.names.len());
+    let columns = recorded.names.iter().cloned().zip(columns.chunks(part.times.len())).collect();
+    auditor.take(&Run { times: &part.times, columns: &columns, parameters: &recorded.parameters });
+}
+
+/// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.
+fn turned(rows: &[f64], columns: usize) -> Vec<f64> {
+    let (count, side) = (rows.len() / columns.max(1), 32);
+    let mut all = vec![0.0; rows.len()];
+    for (row, column) in (0..count).step_by(side).flat_map(|r| (0..columns).step_by(side).map(move |c| (r, c))) {
+        for i in row..count.min(row + side) {
+            for j in column..columns.min(column + side) {
+                all[j * count + i] = rows[i * columns + j];
+            }
+        }
+    }
+    all
+}
