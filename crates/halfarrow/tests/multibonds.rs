@@ -891,3 +891,36 @@ output h = corner.height
 ";
     close(last(&run(text, &Run { to: 0.1, ..Run::default() }), "h"), 0.3 + 20.0 + 50.0, 1e-12);
 }
+
+/// Bodies in a row by `for`, with junctions of frames that have indices, move as the same ones written one by one.
+#[test]
+fn rows_of_bodies_are_repeated() {
+    let head = "model Row\nimport std.multibody\nparam n = 4\nWorld:ground\n";
+    let repeated = "for i in 1..n {
+Revolute:hinge[i](n = if mod(i, 2) == 1 then [0, 1, 0] else [1, 0, 0], q0 = 0.3, w0 = 0.1*i, fixed = 1)
+hinge[i] -> 1[frame]:link[i] -> Body:bob[i](m = 1, J = diag([0.02, 0.03, 0.01]), c = [0, 0, -0.25])
+if i == 1 { ground -> hinge[i] } else { link[i - 1] -> FixedTranslation:rod[i](d = [0, 0, -0.5]) -> hinge[i] }
+}
+output tip = link[n].r[3] : m\n";
+    let single = |i: usize| {
+        let axis = if i % 2 == 1 { "[0, 1, 0]" } else { "[1, 0, 0]" };
+        let before = match i {
+            1 => "ground -> hinge1".to_string(),
+            _ => format!("link{} -> FixedTranslation:rod{i}(d = [0, 0, -0.5]) -> hinge{i}", i - 1),
+        };
+        format!(
+            "Revolute:hinge{i}(n = {axis}, q0 = 0.3, w0 = 0.1*{i}, fixed = 1)
+hinge{i} -> 1[frame]:link{i} -> Body:bob{i}(m = 1, J = diag([0.02, 0.03, 0.01]), c = [0, 0, -0.25])\n{before}\n"
+        )
+    };
+    let written: String = (1..=4).map(single).collect();
+    let written = format!("{head}{written}output tip = link4.r[3] : m\n");
+    let repeated = format!("{head}{repeated}");
+    let how = Run { to: 2.0, rtol: 1e-9, ..Run::default() };
+    let (row, single) = (run(&repeated, &how), run(&written, &how));
+    assert_eq!(states(&repeated).len(), 8);
+    close(last(&row, "tip"), last(&single, "tip"), 1e-12);
+    close(last(&row, "link[4].w.y.f"), last(&single, "link4.w.y.f"), 1e-11);
+    let energy = row.report.audit.energy.expect("it is balanced").value;
+    assert!(energy < 1e-8, "{energy:e}");
+}

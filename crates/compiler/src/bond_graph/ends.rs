@@ -198,11 +198,11 @@ impl<'a> Flat<'a> {
     /// What the name of an element stands for where it is declared.
     fn declared_node(&mut self, here: Here, element: &'a ast::Element) -> Option<(Node, Span)> {
         match self.names.scopes[here.scope].nodes.get(element.name.text.as_str()).copied()? {
-            (node @ Node::Family(_), span) if !element.widths.is_empty() => Some((node, span)),
-            (Node::Family(family), _) => {
-                let (indices, _) = self.indices_and_ports(here, element)?;
-                self.names.node_families[family].element(&indices).copied()
-            }
+            (node @ Node::Family(family), span) => match &*self.indices_and_ports(here, element)?.0 {
+                // The bonds of one node.
+                [] if !element.widths.is_empty() => Some((node, span)),
+                indices => self.names.node_families[family].element(indices).copied(),
+            },
             found => Some(found),
         }
     }

@@ -93,7 +93,7 @@ impl<'a> Flat<'a> {
             && let [one] = path.parts.as_slice()
             && let Some(&kind) = self.names.port_kinds.get(one.name.text.as_str())
         {
-            return self.junction_of_kind(here, element, word, kind, pseudo);
+            return self.junction_of_kind(here, (element, indices), word, kind, pseudo);
         }
         let widths: Option<Vec<usize>> = element.widths.iter().map(|e| self.width(here, e)).collect();
         let Some(widths) = widths else { return };

@@ -52,7 +52,7 @@ impl<'a> Flat<'a> {
 
     /// Makes a port of an instance whose bonds and signals are those of a kind.
     pub fn port_of_kind(&mut self, owner: ScopeId, d: &'a ast::Declaration, kind: &'a ast::PortKind, way: Way) {
-        let Some(scope) = self.frame(Here::of(owner), &d.name, kind, way) else { return };
+        let Some(scope) = self.frame(Here::of(owner), (&d.name, &[]), kind, way) else { return };
         for bond in &kind.bonds {
             let Some(widths) = self.indices(Here::of(0), &bond.indices) else { return };
             let joint = |flat: &mut Self, indices: &[i64]| {
@@ -78,12 +78,12 @@ impl<'a> Flat<'a> {
     pub fn junction_of_kind(
         &mut self,
         here: Here,
-        element: &'a ast::Element,
+        (element, indices): (&'a ast::Element, &[i64]),
         word: Word,
         kind: &'a ast::PortKind,
         pseudo: bool,
     ) {
-        let Some(scope) = self.frame(here, &element.name, kind, Way::Passes) else { return };
+        let Some(scope) = self.frame(here, (&element.name, indices), kind, Way::Passes) else { return };
         for bond in &kind.bonds {
             let width = match bond.indices.first() {
                 Some(width) => self.width(Here::of(0), width),
@@ -95,13 +95,20 @@ impl<'a> Flat<'a> {
         self.signals_to_come(scope, kind);
     }
 
-    fn frame(&mut self, here: Here, name: &'a ast::Name, kind: &'a ast::PortKind, way: Way) -> Option<ScopeId> {
+    fn frame(
+        &mut self,
+        here: Here,
+        (name, indices): (&'a ast::Name, &[i64]),
+        kind: &'a ast::PortKind,
+        way: Way,
+    ) -> Option<ScopeId> {
         let scope = self.names.scopes.len();
-        if !self.place(here.scope, name, &[], Node::Instance(scope)) {
+        if !self.place(here.scope, name, indices, Node::Instance(scope)) {
             return None;
         }
         let around = &self.names.scopes[here.scope];
-        let (prefix, instance, depth) = (format!("{}{}.", around.prefix, name.text), around.instance, around.depth);
+        let (prefix, instance, depth) =
+            (format!("{}{}.", around.prefix, spelled(&name.text, indices)), around.instance, around.depth);
         self.names.scopes.push(Scope {
             prefix,
             parent: Some(here.scope),
