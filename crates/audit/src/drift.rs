@@ -117,7 +117,7 @@ impl Relation {
         let (mut room, mut before) = (Vec::new(), None);
         let mut begin = self.begin;
         for sample in 0..values.times.len() {
-            let [value] = reader.values_in(&mut room, sample, &[])?[0];
+            let value = reader.values_in(&mut room, sample, &[])?[0];
             let at_once = sample > 0 && values.times[sample] <= values.times[sample - 1];
             let jump = if at_once { before.map_or(0.0, |before| value - before) } else { 0.0 };
             let from = begin.map_or(value, |begin: f64| begin + jump);

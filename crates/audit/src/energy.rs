@@ -3,7 +3,6 @@
 use crate::at_once::{AtOnce, STRETCHES};
 use crate::laws::sensitivities;
 use crate::quadrature::gauss;
-use crate::regions::Classes;
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst, above};
@@ -29,20 +28,16 @@ pub(crate) fn notes(graph: &BondGraph) -> Vec<String> {
 
 /// What the laws of a storage read besides its own variables and parameters.
 fn outside(graph: &BondGraph, id: ElementId, element: &Element, storage: &Storage) -> BTreeSet<Symbol> {
-    let mut own: BTreeSet<Symbol> = storage.stored.iter().copied().collect();
-    for port in 0..element.ports.len() as u32 {
-        if let Some((z, _)) = graph.storage_symbols(PortRef { element: id, port }) {
-            own.insert(z);
-        }
-    }
+    let port = |port: u32| graph.storage_symbols(PortRef { element: id, port }).map(|(z, _)| z);
+    let own = |s: &Symbol| storage.stored.contains(s) || (0..element.ports.len() as u32).any(|p| port(p) == Some(*s));
     let laws = storage.laws.iter().flat_map(|law| match *law {
         StorageLaw::Integral(e) | StorageLaw::Derivative(e) | StorageLaw::Implicit(e) => [Some(e), None],
         // Its displacement is imposed; what it stores follows from its law alone.
         StorageLaw::Known { law, .. } => [Some(law), None],
     });
-    let read: BTreeSet<Symbol> = laws.flatten().flat_map(|e: Expr| graph.exprs.symbols_of(e)).collect();
+    let read = laws.flatten().flat_map(|e: Expr| graph.exprs.symbols_of(e));
     let parameter = |s: &Symbol| matches!(graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
-    read.into_iter().filter(|s| !own.contains(s) && !parameter(s)).collect()
+    read.filter(|s| !own(s) && !parameter(s)).collect()
 }
 
 /// Stored quantities and integrated signals against the integrals of their rates.
@@ -89,7 +84,7 @@ pub(crate) fn rates(
             }
         };
         let mut room = Vec::new();
-        let mut at = |k: usize| reader.values_in(&mut room, k, &[]).map_or(f64::NAN, |v| v[0][0]);
+        let mut at = |k: usize| reader.values_in(&mut room, k, &[]).map_or(f64::NAN, |v| v[0]);
         let rate: Vec<f64> = (0..x.len()).map(&mut at).collect();
         if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
             unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
@@ -151,9 +146,13 @@ pub(crate) struct Balance {
 }
 
 /// Stored energy against what was supplied and dissipated, over all parts without pseudo-bonds.
-pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<String>) -> Option<Balance> {
-    let parts = Classes::new(graph, |kind| kind.is_inner());
-    let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
+pub(crate) fn balance(
+    graph: &BondGraph,
+    values: &Values,
+    scales: &Scales,
+    unchecked: &mut Vec<String>,
+) -> Option<Balance> {
+    let pseudo = pseudo_parts(graph, scales);
     let n = values.times.len();
     let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
     let (mut any, mut held, mut by_impulses) = (false, 0.0f64, Vec::new());
@@ -162,7 +161,7 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     let mut at_once = AtOnce::new(n);
     for port in graph.outer_ports() {
         let element = &graph.elements[port.element];
-        if pseudo.contains(&parts.of(graph.bond_of(port))) {
+        if pseudo.contains(&scales.part(graph, port)) {
             continue;
         }
         let Some(power) = values.power(port) else {
@@ -197,6 +196,11 @@ pub(crate) fn balance(graph: &BondGraph, values: &Values, unchecked: &mut Vec<St
     let moved = moved.into_iter().fold(held, f64::max);
     let given = if told && takes_only(graph) { given(values.times, &gains) } else { None };
     any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses, given, at_once })
+}
+
+/// The connected parts that have bonds without power.
+pub(crate) fn pseudo_parts(graph: &BondGraph, scales: &Scales) -> BTreeSet<usize> {
+    graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| scales.part_of(id)).collect()
 }
 
 /// Whether all impulses come from set-valued laws at rest, which take energy or leave it as it is: no event resets anything,

@@ -82,8 +82,8 @@ pub(crate) fn residual(
 ) {
     let mut check = Check { graph, values, scales, settled, worst, laws: 0 };
     let mut written = Vec::new();
-    for (name, symbol, left, right) in &values.same {
-        let of = scales.of(graph, *symbol);
+    for (name, symbol, left, right) in values.same() {
+        let of = scales.of(graph, symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
     }
     for element in fixed(graph) {
@@ -462,11 +462,11 @@ impl<'a, 'b> Check<'a, 'b> {
 
     fn sum(&mut self, name: &str, terms: &[(f64, &[f64])], what: &str, of: Quantity) {
         self.laws += 1;
-        let natural = vec![Term::of(of, 1.0)];
-        let scale = self.settled.scale(&natural);
+        let natural = Term::of(of, 1.0);
+        let scale = self.settled.scale(&[natural]);
         for (k, &time) in self.values.times.iter().enumerate() {
             let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
-            self.worst.note_of(self.laws, miss, scale, self.settled, || raw(miss, time, name, what, natural.clone()));
+            self.worst.note_of(self.laws, miss, scale, self.settled, || raw(miss, time, name, what, vec![natural]));
         }
     }
 
@@ -590,14 +590,14 @@ fn moved_by(
     (sample, from): (usize, &[(Symbol, f64)]),
     of: impl Fn(&[f64]) -> f64,
 ) -> Vec<(Quantity, f64)> {
-    let mut moved = from.to_vec();
-    let Some(here) = reader.values(sample, &moved).map(|v| of(&v)) else { return Vec::new() };
+    let (mut moved, mut room) = (from.to_vec(), Vec::new());
+    let Some(here) = reader.values_in(&mut room, sample, &moved).map(&of) else { return Vec::new() };
     let mut weight = |symbol: Symbol| {
         let quantity = scales.of(graph, symbol);
         let by = MOVED * settled.of(quantity);
         let mut change = |by: f64| {
             moved.push((symbol, by));
-            let there = reader.values(sample, &moved).map(|v| of(&v));
+            let there = reader.values_in(&mut room, sample, &moved).map(&of);
             moved.pop();
             there.map(|there| (there - here).abs()).filter(|c| c.is_finite())
         };

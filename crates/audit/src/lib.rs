@@ -33,6 +33,7 @@ use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::BondGraph;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::sync::Arc;
 
 use at_once::STRETCHES;
 pub use drift::{Drift, DriftKind};
@@ -43,8 +44,10 @@ pub use values::wanted;
 pub struct Run<'a> {
     /// Times in s, never decreasing; a time given twice is a jump, its two sides.
     pub times: &'a [f64],
-    /// Columns by name, each as long as `times`, in SI units.
-    pub columns: &'a BTreeMap<String, &'a [f64]>,
+    /// The names of the columns.
+    pub names: &'a [Arc<str>],
+    /// The columns, each as long as `times`, in SI units.
+    pub columns: &'a [&'a [f64]],
     /// Parameters and constants by name, in SI units.
     pub parameters: &'a BTreeMap<String, f64>,
 }
@@ -91,7 +94,7 @@ pub struct Audit {
 /// # Panics
 /// If a column is not as long as the times.
 pub fn audit(graph: &BondGraph, run: &Run) -> Audit {
-    let mut auditor = Auditor::new(graph);
+    let mut auditor = Auditor::of(graph, run);
     auditor.take(run);
     auditor.finish()
 }
@@ -105,16 +108,24 @@ const COMPARED: f64 = 1e-6;
 /// # Panics
 /// If a column is not as long as the times.
 pub fn magnitudes(graph: &BondGraph, run: &Run) -> BTreeMap<String, f64> {
-    let mut auditor = Auditor::new(graph);
+    let mut auditor = Auditor::of(graph, run);
     auditor.take(run);
-    let settled = auditor.scales.settled(graph);
-    let recorded = values::named(graph).into_iter().filter(|(name, _)| run.columns.contains_key(name));
-    recorded.map(|(name, symbol)| (name, COMPARED * settled.beside(auditor.scales.of(graph, symbol)))).collect()
+    let settled = auditor.scales.settled();
+    let recorded: BTreeSet<&str> = run.names.iter().map(|name| &**name).collect();
+    let mut all = BTreeMap::new();
+    values::variables(graph, &mut |name, symbols| {
+        // Of several that have the name the last one counts.
+        if let Some(&symbol) = symbols.last().filter(|_| recorded.contains(name)) {
+            all.insert(name.to_string(), COMPARED * settled.beside(auditor.scales.of(graph, symbol)));
+        }
+    });
+    all
 }
 
 /// Audits a run that comes in parts: what a miss counts relative to is known when all of it was seen.
 pub struct Auditor {
     graph: BondGraph,
+    columns: values::Columns,
     shares: Vec<constraints::Share>,
     quotients: laws::Quotients,
     relations: Vec<drift::Relation>,
@@ -130,8 +141,14 @@ pub struct Auditor {
 }
 
 impl Auditor {
-    /// Nothing has been seen yet.
-    pub fn new(graph: &BondGraph) -> Auditor {
+    /// Audits a run with these columns.
+    fn of(graph: &BondGraph, run: &Run) -> Auditor {
+        let known: BTreeMap<&str, usize> = run.names.iter().enumerate().map(|(i, name)| (&**name, i)).collect();
+        Auditor::new(graph, &mut |name| known.get(name).copied())
+    }
+
+    /// Nothing has been seen yet. `column_of` tells the column that is recorded under a name.
+    pub fn new(graph: &BondGraph, column_of: &mut dyn FnMut(&str) -> Option<usize>) -> Auditor {
         let none = worst::Worst::default;
         let mut x = graph.exprs.clone();
         let shares = constraints::shares(graph, &mut x);
@@ -139,6 +156,7 @@ impl Auditor {
         let relations = drift::relations(graph, &mut x);
         let graph = graph.with_exprs(x);
         Auditor {
+            columns: values::Columns::new(&graph, column_of),
             scales: scales::Scales::new(&graph),
             graph,
             shares,
@@ -159,17 +177,17 @@ impl Auditor {
     /// # Panics
     /// If a column is not as long as the times.
     pub fn take(&mut self, run: &Run) {
-        assert!(run.columns.values().all(|c| c.len() == run.times.len()), "every column has one value a sample");
+        assert!(run.columns.iter().all(|c| c.len() == run.times.len()), "every column has one value a sample");
         let graph = &self.graph;
-        let values = values::Values::new(graph, run);
+        let values = values::Values::new(graph, &self.columns, run);
         self.relations.iter_mut().for_each(|relation| relation.take(graph, &values));
         let mut unchecked = Vec::new();
-        let balance = energy::balance(graph, &values, &mut unchecked);
+        let balance = energy::balance(graph, &values, &self.scales, &mut unchecked);
         self.scales.absorb(graph, &values);
         balance.iter().for_each(|balance| self.scales.absorb_energy(balance.moved));
-        let links = laws::links((graph, &self.quotients), &values, &self.scales, &self.scales.settled(graph));
+        let links = laws::links((graph, &self.quotients), &values, &self.scales, &self.scales.settled());
         self.scales.absorb_links(&links);
-        let settled = self.scales.settled(graph);
+        let settled = self.scales.settled();
         let scales = (&self.scales, &settled);
         power::power(graph, &values, scales, &mut self.power, &mut unchecked);
         laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
@@ -192,7 +210,7 @@ impl Auditor {
 
     /// What was found.
     pub fn finish(self) -> Audit {
-        let settled = self.scales.settled(&self.graph);
+        let settled = self.scales.settled();
         let notes = energy::notes(&self.graph);
         let impulses = !self.graph.clauses.is_empty() || self.graph.has_leaping_ratios();
         let events = if impulses { self.by_impulses } else { BTreeMap::new() };

@@ -1,11 +1,10 @@
 //! The junction structure makes no power.
 
-use crate::regions::Classes;
+use crate::energy::pseudo_parts;
 use crate::scales::{Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::bond_graph::{BondGraph, PortRef};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Greatest power made or eaten by a connected junction structure, relative to the greatest power at its ports.
 pub(crate) fn power(
@@ -15,16 +14,15 @@ pub(crate) fn power(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    let parts = Classes::new(graph, |kind| kind.is_inner());
-    let pseudo: BTreeSet<usize> = graph.bonds.iter().filter(|(_, b)| b.pseudo).map(|(id, _)| parts.of(id)).collect();
-    let mut ports: BTreeMap<usize, Vec<PortRef>> = BTreeMap::new();
+    let pseudo = pseudo_parts(graph, scales);
+    let mut ports: Vec<Vec<PortRef>> = vec![Vec::new(); scales.part_count()];
     for port in graph.outer_ports() {
-        let part = parts.of(graph.bond_of(port));
+        let part = scales.part(graph, port);
         if !pseudo.contains(&part) {
-            ports.entry(part).or_default().push(port);
+            ports[part].push(port);
         }
     }
-    for ports in ports.values() {
+    for ports in ports.iter().filter(|ports| !ports.is_empty()) {
         let natural = Term::of(scales.power(graph, ports[0]), 1.0);
         let (mut misses, mut all) =
             (vec![-0.0; values.times.len()], vec![settled.scale(&[natural]); values.times.len()]);

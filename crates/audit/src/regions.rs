@@ -4,35 +4,51 @@ use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind};
 use halfarrow_compiler::ids::Id;
 
 /// Bonds in classes that are joined.
+#[derive(Default)]
 pub(crate) struct Classes {
-    leader: Vec<usize>,
+    class: Vec<u32>,
+    count: usize,
 }
 
 impl Classes {
     /// Bonds joined by the elements for which `joins` holds.
     pub fn new(graph: &BondGraph, joins: impl Fn(&Kind) -> bool) -> Classes {
-        let mut classes = Classes { leader: (0..graph.bonds.len()).collect() };
+        let mut leader: Vec<u32> = (0..graph.bonds.len() as u32).collect();
         for element in graph.elements.values().filter(|e| joins(&e.kind)) {
             for pair in element.ports.windows(2) {
-                let (a, b) = (classes.find(pair[0].bond.index()), classes.find(pair[1].bond.index()));
-                classes.leader[a.max(b)] = a.min(b);
+                let (a, b) = (find(&mut leader, pair[0].bond.0), find(&mut leader, pair[1].bond.0));
+                leader[a.max(b) as usize] = a.min(b);
             }
         }
-        for bond in 0..classes.leader.len() {
-            classes.leader[bond] = classes.find(bond);
+        let (mut class, mut count) = (vec![0; leader.len()], 0);
+        for bond in 0..leader.len() {
+            let first = find(&mut leader, bond as u32) as usize;
+            if first == bond {
+                class[bond] = count;
+                count += 1;
+            } else {
+                class[bond] = class[first];
+            }
         }
-        classes
+        Classes { class, count: count as usize }
     }
 
-    /// The class of a bond: the index of its first bond.
+    /// The class of a bond, by its number in the order of their first bonds.
     pub fn of(&self, bond: BondId) -> usize {
-        self.leader[bond.index()]
+        self.class[bond.index()] as usize
     }
 
-    fn find(&self, mut bond: usize) -> usize {
-        while self.leader[bond] != bond {
-            bond = self.leader[bond];
-        }
-        bond
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
     }
+}
+
+/// The first bond of a class.
+fn find(leader: &mut [u32], mut bond: u32) -> u32 {
+    while leader[bond as usize] != bond {
+        leader[bond as usize] = leader[leader[bond as usize] as usize];
+        bond = leader[bond as usize];
+    }
+    bond
 }

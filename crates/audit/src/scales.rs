@@ -12,6 +12,7 @@ use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::unit::Dimension;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The part of what stands beside a quantity that rounding may make of it: errors in the last place, amplified some thousand
 /// times on their way.
@@ -72,7 +73,7 @@ impl Term {
 }
 
 /// What is of like size without a floor of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sort {
     Effort(Option<Dimension>),
     Flow(Option<Dimension>),
@@ -80,19 +81,134 @@ enum Sort {
     Displacement(Option<Dimension>),
 }
 
-/// The greatest magnitudes seen so far; a run may come in parts.
-pub(crate) struct Scales {
+/// Where the sizes of quantities stand.
+#[derive(Default)]
+struct Places {
     regions: Classes,
     parts: Classes,
-    seen: BTreeMap<Quantity, f64>,
-    /// What laws make of one quantity, given another: the greatest weights.
-    links: BTreeMap<(Quantity, Quantity), f64>,
+    /// Of stored quantities and signals, by symbol.
+    of: Vec<u32>,
+    /// How many these are.
+    symbols: usize,
+}
+
+/// What has no place among stored quantities and signals.
+const NOWHERE: u32 = u32::MAX;
+
+impl Places {
+    fn new(graph: &BondGraph) -> Places {
+        let mut places = Places {
+            regions: Classes::new(graph, |kind| matches!(kind, Kind::Zero | Kind::One)),
+            parts: Classes::new(graph, |kind| kind.is_inner()),
+            of: vec![NOWHERE; graph.exprs.symbol_count()],
+            symbols: 0,
+        };
+        for symbol in (0..graph.exprs.symbol_count() as u32).map(Symbol) {
+            if let Quantity::Of(_) = places.quantity(graph, symbol) {
+                places.of[symbol.0 as usize] = places.symbols as u32;
+                places.symbols += 1;
+            }
+        }
+        places
+    }
+
+    /// The place of a quantity; `None` of a symbol that the graph does not have.
+    fn find(&self, quantity: Quantity) -> Option<usize> {
+        let (regions, parts) = (self.regions.count(), self.parts.count());
+        Some(match quantity {
+            Quantity::Effort(region) => region,
+            Quantity::Flow(region) => regions + region,
+            Quantity::Of(symbol) => {
+                let place = self.of.get(symbol.0 as usize).filter(|&&place| place != NOWHERE)?;
+                2 * regions + *place as usize
+            }
+            Quantity::Power(part) => 2 * regions + self.symbols + part,
+            Quantity::Energy => 2 * regions + self.symbols + parts,
+            Quantity::Number => 2 * regions + self.symbols + parts + 1,
+        })
+    }
+
+    fn at(&self, quantity: Quantity) -> usize {
+        self.find(quantity).expect("a quantity of the graph")
+    }
+
+    fn count(&self) -> usize {
+        2 * self.regions.count() + self.symbols + self.parts.count() + 2
+    }
+
+    fn quantity_of_bond(&self, bond: BondId, flow: bool) -> Quantity {
+        let region = self.regions.of(bond);
+        if flow { Quantity::Flow(region) } else { Quantity::Effort(region) }
+    }
+
+    /// The quantity that a symbol is of.
+    fn quantity(&self, graph: &BondGraph, symbol: Symbol) -> Quantity {
+        match graph.variables.get(&symbol).map(|v| v.meaning) {
+            Some(Meaning::Effort(bond)) => self.quantity_of_bond(bond, false),
+            Some(Meaning::Flow(bond)) => self.quantity_of_bond(bond, true),
+            Some(Meaning::Rate(of)) => match graph.variables.get(&of).map(|v| v.meaning) {
+                Some(Meaning::Stored(port)) => self.quantity_of_bond(graph.bond_of(port), rate_is_flow(graph, port)),
+                _ => Quantity::Of(symbol),
+            },
+            _ => Quantity::Of(symbol),
+        }
+    }
+}
+
+/// A size for each place.
+#[derive(Clone, Default)]
+struct Sizes(Vec<f64>);
+
+impl Sizes {
+    fn of(places: &Places) -> Sizes {
+        Sizes(vec![0.0; places.count()])
+    }
+
+    fn raise(&mut self, place: usize, least: f64) {
+        self.0[place] = self.0[place].max(least);
+    }
+
+    /// Each as great as in another at least.
+    fn raise_all(&mut self, least: &Sizes) {
+        self.0.iter_mut().zip(&least.0).for_each(|(size, least)| *size = size.max(*least));
+    }
+}
+
+impl std::ops::Index<usize> for Sizes {
+    type Output = f64;
+    fn index(&self, place: usize) -> &f64 {
+        &self.0[place]
+    }
+}
+
+/// A port of a storage: the places of what it stores, of what that makes and of what changes it, and their sorts.
+struct Stored {
+    held: usize,
+    acts: usize,
+    rate: usize,
+    sort: usize,
+    sort_of_rate: usize,
+}
+
+/// The greatest magnitudes seen so far; a run may come in parts.
+pub(crate) struct Scales {
+    places: Arc<Places>,
+    stored: Vec<Stored>,
+    /// The sorts of the efforts and flows of each region: pairs of place and sort, each once.
+    sorts: Vec<(usize, usize)>,
+    /// How many sorts there are.
+    sort_count: usize,
+    /// The places of the powers of parts that end somewhere.
+    powers: Vec<usize>,
+    seen: Sizes,
+    /// What laws make of one quantity, given another: their places with the greatest weight, in order.
+    links: Vec<(u32, u32, f64)>,
     /// Integrals of the magnitudes of efforts and flows.
-    turnovers: BTreeMap<Quantity, f64>,
+    turnovers: Sizes,
     /// Start values that the model gives.
-    given: BTreeMap<Quantity, f64>,
+    given: Sizes,
     /// Magnitudes below which the method of the run neglected what happens.
-    neglected: BTreeMap<Quantity, f64>,
+    neglected: BTreeMap<usize, f64>,
     begun: Option<f64>,
     /// Length of the run so far, in s.
     span: f64,
@@ -100,16 +216,48 @@ pub(crate) struct Scales {
 
 impl Scales {
     pub fn new(graph: &BondGraph) -> Scales {
+        let places = Places::new(graph);
+        let mut known = Vec::new();
+        let mut sorts: Vec<(usize, usize)> = Vec::new();
+        for bond in graph.bonds.ids() {
+            for flow in [false, true] {
+                let sort = number_of(&mut known, sort_of_bond(graph, bond, flow));
+                sorts.push((places.at(places.quantity_of_bond(bond, flow)), sort));
+            }
+        }
+        sorts.sort_unstable();
+        sorts.dedup();
+        sorts.shrink_to_fit();
+        let storage = |(port, held): (PortRef, Symbol)| {
+            let (acts, _) = graph.storage_symbols(port)?;
+            let (bond, flow) = (graph.bond_of(port), rate_is_flow(graph, port));
+            Some(Stored {
+                held: places.at(Quantity::Of(held)),
+                acts: places.at(places.quantity(graph, acts)),
+                rate: places.at(places.quantity_of_bond(bond, flow)),
+                sort: number_of(&mut known, sort_of_stored(graph, port, held)),
+                sort_of_rate: number_of(&mut known, sort_of_bond(graph, bond, flow)),
+            })
+        };
+        let stored = storages(graph).filter_map(storage).collect();
+        let outer = graph.outer_ports().into_iter();
+        let mut powers: Vec<usize> =
+            outer.map(|port| places.at(Quantity::Power(places.parts.of(graph.bond_of(port))))).collect();
+        powers.sort_unstable();
+        powers.dedup();
         Scales {
-            regions: Classes::new(graph, |kind| matches!(kind, Kind::Zero | Kind::One)),
-            parts: Classes::new(graph, |kind| kind.is_inner()),
-            seen: BTreeMap::new(),
-            links: BTreeMap::new(),
-            turnovers: BTreeMap::new(),
-            given: BTreeMap::new(),
+            stored,
+            sorts,
+            sort_count: known.len(),
+            powers,
+            seen: Sizes::of(&places),
+            links: Vec::new(),
+            turnovers: Sizes::of(&places),
+            given: Sizes::of(&places),
             neglected: BTreeMap::new(),
             begun: None,
             span: 0.0,
+            places: Arc::new(places),
         }
     }
 
@@ -118,26 +266,24 @@ impl Scales {
         if let (Some(&first), Some(&last)) = (values.times.first(), values.times.last()) {
             self.span = last - *self.begun.get_or_insert(first);
         }
-        let mut turned: BTreeMap<Quantity, f64> = BTreeMap::new();
+        let mut turned = Sizes::of(&self.places);
         for bond in graph.bonds.ids() {
             for flow in [false, true] {
                 let column = if flow { values.flow(bond) } else { values.effort(bond) }.unwrap_or_default();
-                let quantity = self.of_bond(bond, flow);
-                self.note(quantity, greatest(column));
-                let most = turned.entry(quantity).or_default();
-                *most = most.max(turnover(values.times, column));
+                let place = self.places.at(self.of_bond(bond, flow));
+                self.seen.raise(place, greatest(column));
+                turned.raise(place, turnover(values.times, column));
             }
         }
-        turned.into_iter().for_each(|(quantity, more)| *self.turnovers.entry(quantity).or_default() += more);
-        for (&symbol, column) in values.columns() {
+        self.turnovers.0.iter_mut().zip(&turned.0).for_each(|(all, more)| *all += more);
+        for (symbol, column) in values.columns() {
             if let quantity @ Quantity::Of(_) = self.of(graph, symbol) {
                 self.note(quantity, greatest(column));
             }
         }
         self.absorb_given(graph, values);
         for port in graph.outer_ports() {
-            let power = values.power(port).unwrap_or_default();
-            self.note(self.power(graph, port), greatest(&power));
+            self.note(self.power(graph, port), values.greatest_power(port));
         }
     }
 
@@ -150,9 +296,8 @@ impl Scales {
         for initial in starts.flatten() {
             let value = graph.exprs.eval(initial.value, &mut |s| values.parameter(s).unwrap_or(f64::NAN)).abs();
             if value.is_finite() {
-                let quantity = self.of(graph, initial.symbol);
-                let given = self.given.entry(quantity).or_default();
-                *given = given.max(value);
+                let place = self.places.at(self.of(graph, initial.symbol));
+                self.given.raise(place, value);
             }
         }
     }
@@ -165,24 +310,27 @@ impl Scales {
     /// Takes note of what laws make of their variables, both ways.
     pub fn absorb_links(&mut self, links: &[Link]) {
         for link in links.iter().filter(|link| link.weight > 0.0 && link.weight.is_finite()) {
-            let back = link.straight.then_some(((link.from, link.of), 1.0 / link.weight));
-            for (pair, weight) in [Some(((link.of, link.from), link.weight)), back].into_iter().flatten() {
-                let known = self.links.entry(pair).or_default();
-                *known = known.max(weight);
+            let (of, from) = (self.places.at(link.of) as u32, self.places.at(link.from) as u32);
+            self.links.push((of, from, link.weight));
+            if link.straight {
+                self.links.push((from, of, 1.0 / link.weight));
             }
         }
+        self.links.sort_unstable_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(b.2.total_cmp(&a.2)));
+        self.links.dedup_by_key(|link| (link.0, link.1));
     }
 
     /// Takes note of the magnitude below which the method neglected what happens to a variable.
     pub fn neglect(&mut self, graph: &BondGraph, symbol: Symbol, magnitude: f64) {
-        let quantity = self.of(graph, symbol);
-        let least = self.neglected.entry(quantity).or_default();
-        *least = least.max(magnitude);
+        if let Some(place) = self.places.find(self.of(graph, symbol)) {
+            let least = self.neglected.entry(place).or_default();
+            *least = least.max(magnitude);
+        }
     }
 
     fn note(&mut self, quantity: Quantity, magnitude: f64) {
-        let seen = self.seen.entry(quantity).or_default();
-        *seen = seen.max(magnitude);
+        let place = self.places.at(quantity);
+        self.seen.raise(place, magnitude);
     }
 
     /// Length of the run so far, in s.
@@ -192,117 +340,100 @@ impl Scales {
 
     /// The quantity of an effort or flow.
     pub fn of_bond(&self, bond: BondId, flow: bool) -> Quantity {
-        let region = self.regions.of(bond);
-        if flow { Quantity::Flow(region) } else { Quantity::Effort(region) }
+        self.places.quantity_of_bond(bond, flow)
     }
 
     /// The powers that those at a port stand beside.
     pub fn power(&self, graph: &BondGraph, port: PortRef) -> Quantity {
-        Quantity::Power(self.parts.of(graph.bond_of(port)))
+        Quantity::Power(self.part(graph, port))
+    }
+
+    /// The connected part that a port belongs to.
+    pub fn part(&self, graph: &BondGraph, port: PortRef) -> usize {
+        self.part_of(graph.bond_of(port))
+    }
+
+    /// The connected part that a bond belongs to.
+    pub fn part_of(&self, bond: BondId) -> usize {
+        self.places.parts.of(bond)
+    }
+
+    /// How many connected parts there are.
+    pub fn part_count(&self) -> usize {
+        self.places.parts.count()
     }
 
     /// The quantity that a symbol is of.
     pub fn of(&self, graph: &BondGraph, symbol: Symbol) -> Quantity {
-        match graph.variables.get(&symbol).map(|v| v.meaning) {
-            Some(Meaning::Effort(bond)) => self.of_bond(bond, false),
-            Some(Meaning::Flow(bond)) => self.of_bond(bond, true),
-            Some(Meaning::Rate(of)) => match graph.variables.get(&of).map(|v| v.meaning) {
-                Some(Meaning::Stored(port)) => self.rate(graph, port),
-                _ => Quantity::Of(symbol),
-            },
-            _ => Quantity::Of(symbol),
-        }
-    }
-
-    /// The effort or flow that the rate of a stored quantity is.
-    pub fn rate(&self, graph: &BondGraph, port: PortRef) -> Quantity {
-        let flow = !matches!(graph.elements[port.element].kind, Kind::Inertance(_));
-        self.of_bond(graph.bond_of(port), flow)
+        self.places.quantity(graph, symbol)
     }
 
     /// The scales as the run stands.
-    pub fn settled(&self, graph: &BondGraph) -> Settled {
-        let sorts = self.sorts(graph);
+    pub fn settled(&self) -> Settled {
+        let sorts = self.greatest_of_sorts();
         let mut beside = self.seen.clone();
-        let mut raise = |quantity: Quantity, least: f64| {
-            let most = beside.entry(quantity).or_default();
-            *most = most.max(least);
-        };
-        self.given.iter().for_each(|(&quantity, &given)| raise(quantity, given));
-        for bond in graph.bonds.ids() {
-            for flow in [false, true] {
-                raise(self.of_bond(bond, flow), sorts[&sort_of_bond(graph, bond, flow)]);
-            }
-        }
-        for (port, stored) in storages(graph) {
-            raise(Quantity::Of(stored), sorts[&sort_of_stored(graph, port, stored)].max(self.turnover(graph, port)));
+        beside.raise_all(&self.given);
+        self.sorts.iter().for_each(|&(place, sort)| beside.raise(place, sorts[sort]));
+        for stored in &self.stored {
+            beside.raise(stored.held, sorts[stored.sort].max(self.turnovers[stored.rate]));
         }
         // What stands beside a variable stands beside what a law makes of it.
-        let (of_terms, of_variables): (Vec<_>, Vec<_>) =
-            self.links.iter().partition(|((_, from), _)| *from == Quantity::Number);
-        for (&(quantity, _), weight) in of_terms {
-            let most = beside.entry(quantity).or_default();
-            *most = most.max(*weight);
+        let number = self.places.at(Quantity::Number) as u32;
+        for &(place, _, weight) in self.links.iter().filter(|link| link.1 == number) {
+            beside.raise(place as usize, weight);
         }
         let alone = beside.clone();
         for _ in 0..NEIGHBOURS {
             let near = beside.clone();
-            for ((quantity, from), weight) in of_variables.iter().copied() {
-                let told = *weight * near.get(from).copied().unwrap_or(0.0);
-                let own = alone.get(quantity).copied().unwrap_or(0.0);
+            for &(place, from, weight) in self.links.iter().filter(|link| link.1 != number) {
+                let (place, from) = (place as usize, from as usize);
+                let told = weight * near[from];
+                let own = alone[place];
                 // What is told itself by far greater things than there are makes nothing rounding.
-                let likely = (*weight * alone.get(from).copied().unwrap_or(0.0)).max(told / (AMPLIFIED * AMPLIFIED));
-                let told = if own > FLOOR * likely { told.min(AMPLIFIED * own) } else { told };
-                let most = beside.entry(*quantity).or_default();
-                *most = most.max(told);
+                let likely = (weight * alone[from]).max(told / (AMPLIFIED * AMPLIFIED));
+                beside.raise(place, if own > FLOOR * likely { told.min(AMPLIFIED * own) } else { told });
             }
         }
-        self.raise_energies(graph, &alone, &mut beside);
-        let size = |(&quantity, &beside): (&Quantity, &f64)| {
-            let own = self.seen(quantity).max(FLOOR * beside);
-            (quantity, Size { own, beside, alone: alone.get(&quantity).copied().unwrap_or(0.0) })
-        };
-        let mut of: BTreeMap<Quantity, Size> = beside.iter().map(size).collect();
-        for (stored, least) in self.least_stored(graph) {
-            let size = of.entry(stored).or_default();
-            size.own = size.own.max(least);
+        self.raise_energies(&alone, &mut beside);
+        let size =
+            |((&seen, &beside), &alone): ((&f64, &f64), &f64)| Size { own: seen.max(FLOOR * beside), beside, alone };
+        let mut of: Vec<Size> = self.seen.0.iter().zip(&beside.0).zip(&alone.0).map(size).collect();
+        for (place, least) in self.least_stored() {
+            of[place].own = of[place].own.max(least);
         }
-        Settled { of }
+        Settled { places: self.places.clone(), of }
     }
 
     /// What the stored quantities count as at least, since the method neglected what is less. It is believed up to what
     /// would be there if the storage held the energy of the greatest: it may have been wrong about a magnitude. Storages
     /// that depend on others go with them: what holds less energy than was neglected of any state is neglected.
-    fn least_stored(&self, graph: &BondGraph) -> Vec<(Quantity, f64)> {
+    fn least_stored(&self) -> Vec<(usize, f64)> {
         if self.neglected.is_empty() {
             return Vec::new();
         }
-        let energy = |port: PortRef, stored: Symbol| {
-            let acts = graph.storage_symbols(port).map_or(0.0, |(z, _)| self.seen(self.of(graph, z)));
-            acts * self.seen(Quantity::Of(stored))
-        };
-        let held: Vec<(Quantity, f64)> =
-            storages(graph).map(|(port, stored)| (Quantity::Of(stored), energy(port, stored))).collect();
+        let energy = |stored: &Stored| self.seen[stored.acts] * self.seen[stored.held];
+        let held: Vec<(usize, f64)> = self.stored.iter().map(|stored| (stored.held, energy(stored))).collect();
         let most = held.iter().fold(0.0, |most: f64, (_, energy)| most.max(*energy));
         let told = self.neglected_through_laws();
-        let neglected = |(quantity, held): &(Quantity, f64)| {
-            let share = told.get(quantity)? / self.seen(*quantity);
-            (*held > 0.0).then(|| (held * share * share).min(most))
+        let neglected = |&(place, held): &(usize, f64)| {
+            let share = told[place]? / self.seen[place];
+            (held > 0.0).then(|| (held * share * share).min(most))
         };
         let shared = held.iter().filter_map(neglected).fold(0.0, f64::max);
-        let least = |of: &(Quantity, f64)| {
+        let least = |of: &(usize, f64)| {
             let energy = neglected(of).unwrap_or(shared);
-            (of.0, self.seen(of.0) * if of.1 > 0.0 { (energy / of.1).sqrt() } else { 0.0 })
+            (of.0, self.seen[of.0] * if of.1 > 0.0 { (energy / of.1).sqrt() } else { 0.0 })
         };
         held.iter().map(least).collect()
     }
 
     /// The magnitudes below which the method neglected quantities, told of themselves or of what a law joins them with.
-    fn neglected_through_laws(&self) -> BTreeMap<Quantity, f64> {
-        let mut all = self.neglected.clone();
-        for ((of, from), weight) in &self.links {
-            if let Some(magnitude) = self.neglected.get(from) {
-                let least = all.entry(*of).or_default();
+    fn neglected_through_laws(&self) -> Vec<Option<f64>> {
+        let mut all = vec![None; self.places.count()];
+        self.neglected.iter().for_each(|(&place, &magnitude)| all[place] = Some(magnitude));
+        for &(of, from, weight) in &self.links {
+            if let Some(magnitude) = self.neglected.get(&(from as usize)) {
+                let least = all[of as usize].get_or_insert(0.0);
                 *least = least.max(weight * magnitude);
             }
         }
@@ -310,61 +441,35 @@ impl Scales {
     }
 
     /// The greatest quantity of each sort.
-    fn sorts(&self, graph: &BondGraph) -> BTreeMap<Sort, f64> {
-        let mut sorts: BTreeMap<Sort, f64> = BTreeMap::new();
-        let mut note = |sort: Sort, magnitude: f64| {
-            let most = sorts.entry(sort).or_default();
-            *most = most.max(magnitude);
-        };
-        for bond in graph.bonds.ids() {
-            for flow in [false, true] {
-                note(sort_of_bond(graph, bond, flow), self.seen(self.of_bond(bond, flow)));
-            }
-        }
-        for (port, stored) in storages(graph) {
-            let rate_is_flow = matches!(self.rate(graph, port), Quantity::Flow(_));
-            let held = self.seen(Quantity::Of(stored));
-            note(sort_of_stored(graph, port, stored), held);
+    fn greatest_of_sorts(&self) -> Vec<f64> {
+        let mut sorts = vec![0.0f64; self.sort_count];
+        let mut note = |sort: usize, magnitude: f64| sorts[sort] = sorts[sort].max(magnitude);
+        self.sorts.iter().for_each(|&(place, sort)| note(sort, self.seen[place]));
+        for stored in &self.stored {
+            let held = self.seen[stored.held];
+            note(stored.sort, held);
             // A rate below a part of this changes what is stored by no more than that part.
-            note(sort_of_bond(graph, graph.bond_of(port), rate_is_flow), held * self.per_second());
+            note(stored.sort_of_rate, held * self.per_second());
         }
         sorts
     }
 
     /// Energies stand beside what storages hold at the sizes of their variables, powers beside these energies in the time of the
     /// run.
-    fn raise_energies(&self, graph: &BondGraph, alone: &BTreeMap<Quantity, f64>, beside: &mut BTreeMap<Quantity, f64>) {
-        let held = |sizes: &BTreeMap<Quantity, f64>| {
-            let size = |quantity: Quantity| sizes.get(&quantity).copied().unwrap_or(0.0);
-            let held = storages(graph).filter_map(|(port, stored)| {
-                let z = graph.storage_symbols(port)?.0;
-                Some(size(self.of(graph, z)) * size(Quantity::Of(stored)))
-            });
+    fn raise_energies(&self, alone: &Sizes, beside: &mut Sizes) {
+        let held = |sizes: &Sizes| {
+            let held = self.stored.iter().map(|stored| sizes[stored.acts] * sizes[stored.held]);
             held.fold(0.0, f64::max)
         };
         let (own, told) = (held(alone), held(beside));
-        let held = if own > FLOOR * told { own } else { told };
-        let ports = graph.outer_ports();
-        let energy = beside.entry(Quantity::Energy).or_default();
-        *energy = energy.max(held);
-        let power = *energy * self.per_second();
-        for port in ports {
-            let most = beside.entry(self.power(graph, port)).or_default();
-            *most = most.max(power);
-        }
-    }
-
-    fn seen(&self, quantity: Quantity) -> f64 {
-        self.seen.get(&quantity).copied().unwrap_or(0.0)
+        let energy = self.places.at(Quantity::Energy);
+        beside.raise(energy, if own > FLOOR * told { own } else { told });
+        let power = beside[energy] * self.per_second();
+        self.powers.iter().for_each(|&place| beside.raise(place, power));
     }
 
     fn per_second(&self) -> f64 {
         if self.span > 0.0 { 1.0 / self.span } else { 0.0 }
-    }
-
-    /// The integral of the magnitude of what moves a stored quantity, or stands where that does.
-    pub fn turnover(&self, graph: &BondGraph, port: PortRef) -> f64 {
-        self.turnovers.get(&self.rate(graph, port)).copied().unwrap_or(0.0)
     }
 }
 
@@ -376,6 +481,19 @@ fn storages(graph: &BondGraph) -> impl Iterator<Item = (PortRef, Symbol)> {
             _ => &[],
         };
         stored.iter().enumerate().map(move |(port, &symbol)| (PortRef { element, port: port as u32 }, symbol))
+    })
+}
+
+/// Whether the rate of what a storage holds is a flow.
+fn rate_is_flow(graph: &BondGraph, port: PortRef) -> bool {
+    !matches!(graph.elements[port.element].kind, Kind::Inertance(_))
+}
+
+/// The number of a sort among those that are known.
+fn number_of(known: &mut Vec<Sort>, sort: Sort) -> usize {
+    known.iter().position(|k| *k == sort).unwrap_or_else(|| {
+        known.push(sort);
+        known.len() - 1
     })
 }
 
@@ -416,8 +534,10 @@ struct Size {
 }
 
 /// The sizes of all quantities as the run stands.
+#[derive(Default)]
 pub(crate) struct Settled {
-    of: BTreeMap<Quantity, Size>,
+    places: Arc<Places>,
+    of: Vec<Size>,
 }
 
 /// What a miss is measured with.
@@ -456,7 +576,7 @@ impl Settled {
     fn size(&self, quantity: Quantity) -> Size {
         match quantity {
             Quantity::Number => Size { own: 1.0, beside: 1.0, alone: 1.0 },
-            quantity => self.of.get(&quantity).copied().unwrap_or_default(),
+            quantity => self.places.find(quantity).and_then(|place| self.of.get(place).copied()).unwrap_or_default(),
         }
     }
 }
@@ -485,7 +605,7 @@ mod tests {
 
     #[test]
     fn a_miss_of_nothing_is_nothing_and_no_scale_vanishes() {
-        let settled = Settled { of: BTreeMap::new() };
+        let settled = Settled::default();
         let scale = settled.scale(&[Term::of(Quantity::Energy, 1.0)]);
         assert!(scale.relative(f64::MIN_POSITIVE) < 1e-15);
         assert_eq!(scale.relative(0.0), 0.0);
@@ -495,7 +615,7 @@ mod tests {
 
     #[test]
     fn what_rounding_makes_counts_relative_to_what_stands_beside() {
-        let settled = Settled { of: BTreeMap::new() };
+        let settled = Settled::default();
         let scale = settled.scale(&[Term::of(Quantity::Number, 1e-3), Term::beside(Quantity::Number, 1e3)]);
         assert!((scale.relative(1e-12) - 1e-15).abs() < 1e-25);
         assert!((scale.relative(1e-5) - 1e-2).abs() < 1e-5);

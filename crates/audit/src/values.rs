@@ -3,54 +3,109 @@
 use crate::Run;
 use crate::quadrature::Quadrature;
 use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Exprs, Function, Node, Symbol};
-use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
-use halfarrow_compiler::ids::Table;
+use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, Port, PortRef};
 use rustc_hash::FxHashMap;
 use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
-/// The names of the variables that an audit reads, as `--record` takes them: all efforts, flows and stored quantities
-/// of elements, junctions and named bonds, integrated signals, inputs and held signals.
+/// The names of the variables that an audit reads, as `--record` takes them, each once in alphabetical order: all efforts, flows
+/// and stored quantities of elements, junctions and named bonds, integrated signals, inputs and held signals.
 pub fn wanted(graph: &BondGraph) -> Vec<String> {
-    let all: BTreeSet<String> = named(graph).into_iter().map(|(name, _)| name).collect();
+    let mut all = BTreeSet::new();
+    variables(graph, &mut |name, _| {
+        all.insert(name.to_string());
+    });
     all.into_iter().collect()
 }
 
-/// The variables that an audit reads, by the names that they are recorded by.
-pub(crate) fn named(graph: &BondGraph) -> Vec<(String, Symbol)> {
-    let (mut all, mut common) = (Vec::new(), Vec::new());
-    for element in graph.elements.values() {
+/// Calls `visit` with the variables that an audit reads: the name that each is recorded by, and what it says the value of.
+pub(crate) fn variables(graph: &BondGraph, visit: &mut dyn FnMut(&str, &[Symbol])) {
+    let mut name = String::new();
+    let mut visit = |parts: [&str; 4], symbols: &[Symbol]| {
+        name.clear();
+        name.extend(parts);
+        visit(&name, symbols);
+    };
+    let dot = |port: &str| if port.is_empty() { "" } else { "." };
+    for element in graph.elements.values().filter(|e| !matches!(e.kind, Kind::Zero | Kind::One)) {
         for (index, port) in element.ports.iter().enumerate() {
-            let bond = &graph.bonds[port.bond];
-            let place = match port.name.as_str() {
-                "" => element.name.clone(),
-                port => format!("{}.{port}", element.name),
-            };
+            let (bond, own, port) = (&graph.bonds[port.bond], element.name.as_str(), port.name.as_str());
+            visit([own, dot(port), port, ".e"], &[bond.effort]);
+            visit([own, dot(port), port, ".f"], &[bond.flow]);
             match &element.kind {
-                Kind::Zero => common.push((format!("{place}.e"), bond.effort)),
-                Kind::One => common.push((format!("{place}.f"), bond.flow)),
-                kind => {
-                    all.push((format!("{place}.e"), bond.effort));
-                    all.push((format!("{place}.f"), bond.flow));
-                    match kind {
-                        Kind::Inertance(s) => all.push((format!("{place}.p"), s.stored[index])),
-                        Kind::Compliance(s) => all.push((format!("{place}.q"), s.stored[index])),
-                        _ => {}
-                    }
-                }
+                Kind::Inertance(s) => visit([own, dot(port), port, ".p"], &[s.stored[index]]),
+                Kind::Compliance(s) => visit([own, dot(port), port, ".q"], &[s.stored[index]]),
+                _ => {}
             }
         }
     }
     for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
-        all.push((format!("{}.e", bond.name), bond.effort));
-        all.push((format!("{}.f", bond.name), bond.flow));
+        visit([&bond.name, "", "", ".e"], &[bond.effort]);
+        visit([&bond.name, "", "", ".f"], &[bond.flow]);
     }
-    all.extend(graph.signals.values().map(|s| (s.name.clone(), s.symbol)));
-    all.extend(graph.inputs.values().map(|i| (i.name.clone(), i.symbol)));
-    all.extend(graph.held.values().map(|h| (h.name.clone(), h.symbol)));
-    all.extend(common);
-    all
+    graph.signals.values().for_each(|s| visit([&s.name, "", "", ""], &[s.symbol]));
+    graph.inputs.values().for_each(|i| visit([&i.name, "", "", ""], &[i.symbol]));
+    graph.held.values().for_each(|h| visit([&h.name, "", "", ""], &[h.symbol]));
+    let mut common = Vec::new();
+    for element in graph.elements.values() {
+        let flow = match element.kind {
+            Kind::Zero => false,
+            Kind::One => true,
+            _ => continue,
+        };
+        for ports in element.ports.chunk_by(|a, b| a.name == b.name) {
+            let (own, port) = (element.name.as_str(), ports[0].name.as_str());
+            let symbol = |port: &Port| if flow { graph.bonds[port.bond].flow } else { graph.bonds[port.bond].effort };
+            common.clear();
+            common.extend(ports.iter().map(symbol));
+            visit([own, dot(port), port, if flow { ".f" } else { ".e" }], &common);
+        }
+    }
+}
+
+/// Which recorded column tells which variable.
+pub(crate) struct Columns {
+    /// By symbol.
+    of: Vec<u32>,
+    /// Columns that say the same as that of a symbol: the symbol, they, and that one.
+    same: Vec<(Symbol, u32, u32)>,
+}
+
+/// The column of what is not recorded.
+const NONE: u32 = u32::MAX;
+
+impl Columns {
+    /// `column_of` tells the column that is recorded under a name.
+    pub fn new(graph: &BondGraph, column_of: &mut dyn FnMut(&str) -> Option<usize>) -> Columns {
+        let mut columns = Columns { of: vec![NONE; graph.exprs.symbol_count()], same: Vec::new() };
+        variables(graph, &mut |name, symbols| {
+            let Some(column) = column_of(name) else { return };
+            for &symbol in symbols {
+                match &mut columns.of[symbol.0 as usize] {
+                    unknown @ &mut NONE => *unknown = column as u32,
+                    known => columns.same.push((symbol, column as u32, *known)),
+                }
+            }
+        });
+        // A bond that was not recorded itself has the common variable of a junction it ends at.
+        for element in graph.elements.values() {
+            let symbol = |port: &Port| match element.kind {
+                Kind::Zero => Some(graph.bonds[port.bond].effort),
+                Kind::One => Some(graph.bonds[port.bond].flow),
+                _ => None,
+            };
+            let all = || element.ports.iter().filter_map(symbol).map(|s| s.0 as usize);
+            let Some(common) = all().map(|s| columns.of[s]).find(|&column| column != NONE) else { continue };
+            all().for_each(|s| {
+                if columns.of[s] == NONE {
+                    columns.of[s] = common;
+                }
+            });
+        }
+        columns
+    }
 }
 
 /// The side of a jump that a sample shows.
@@ -92,72 +147,37 @@ pub(crate) struct Values<'a> {
     pub times: &'a [f64],
     /// What the samples weigh in integrals.
     pub quadrature: Quadrature,
-    columns: BTreeMap<Symbol, &'a [f64]>,
+    of: &'a Columns,
+    columns: &'a [&'a [f64]],
+    names: &'a [Arc<str>],
     parameters: BTreeMap<Symbol, f64>,
-    efforts: Table<BondId, Option<&'a [f64]>>,
-    flows: Table<BondId, Option<&'a [f64]>>,
-    /// Columns that say the same as that of a symbol, with their names.
-    pub same: Vec<(String, Symbol, &'a [f64], &'a [f64])>,
     /// Borders in expressions, as far as they are known.
     borders: RefCell<FxHashMap<Expr, Borders>>,
 }
 
 impl<'a> Values<'a> {
-    pub fn new(graph: &'a BondGraph, run: &Run<'a>) -> Values<'a> {
-        let mut columns: BTreeMap<Symbol, &'a [f64]> = BTreeMap::new();
-        let mut same = Vec::new();
-        for (name, symbol) in named(graph) {
-            let Some(&column) = run.columns.get(&name) else { continue };
-            match columns.get(&symbol) {
-                Some(known) => same.push((name, symbol, column, *known)),
-                None => {
-                    columns.insert(symbol, column);
-                }
-            }
-        }
+    pub fn new(graph: &'a BondGraph, of: &'a Columns, run: &Run<'a>) -> Values<'a> {
         let parameters = graph.parameters.values();
         let parameters = parameters.filter_map(|p| Some((p.symbol, *run.parameters.get(&p.name)?))).collect();
-        let mut efforts: Table<BondId, Option<&[f64]>> =
-            graph.bonds.values().map(|b| columns.get(&b.effort).copied()).collect();
-        let mut flows: Table<BondId, Option<&[f64]>> =
-            graph.bonds.values().map(|b| columns.get(&b.flow).copied()).collect();
-        // A bond that was not recorded itself has the common variable of a junction it ends at.
-        for element in graph.elements.values() {
-            let table = match element.kind {
-                Kind::Zero => &mut efforts,
-                Kind::One => &mut flows,
-                _ => continue,
-            };
-            let common = element.ports.iter().find_map(|port| table[port.bond]);
-            element.ports.iter().for_each(|port| table[port.bond] = table[port.bond].or(common));
-        }
-        for (id, bond) in graph.bonds.iter() {
-            efforts[id].into_iter().for_each(|c| {
-                columns.entry(bond.effort).or_insert(c);
-            });
-            flows[id].into_iter().for_each(|c| {
-                columns.entry(bond.flow).or_insert(c);
-            });
-        }
-        Values {
-            graph,
-            times: run.times,
-            quadrature: Quadrature::new(run.times),
-            columns,
-            parameters,
-            efforts,
-            flows,
-            same,
-            borders: RefCell::default(),
-        }
+        let (quadrature, borders) = (Quadrature::new(run.times), RefCell::default());
+        Values { graph, times: run.times, quadrature, of, columns: run.columns, names: run.names, parameters, borders }
+    }
+
+    /// Columns that say the same as that of a symbol: their names, the symbol, and both.
+    pub fn same(&self) -> impl Iterator<Item = (&'a str, Symbol, &'a [f64], &'a [f64])> + '_ {
+        let column = |at: u32| self.columns[at as usize];
+        self.of.same.iter().map(move |&(symbol, own, known)| {
+            let name: &'a str = &self.names[own as usize];
+            (name, symbol, column(own), column(known))
+        })
     }
 
     pub fn effort(&self, bond: BondId) -> Option<&'a [f64]> {
-        self.efforts[bond]
+        self.column(self.graph.bonds[bond].effort)
     }
 
     pub fn flow(&self, bond: BondId) -> Option<&'a [f64]> {
-        self.flows[bond]
+        self.column(self.graph.bonds[bond].flow)
     }
 
     pub fn parameter(&self, symbol: Symbol) -> Option<f64> {
@@ -165,7 +185,8 @@ impl<'a> Values<'a> {
     }
 
     pub fn column(&self, symbol: Symbol) -> Option<&'a [f64]> {
-        self.columns.get(&symbol).copied()
+        let at = *self.of.of.get(symbol.0 as usize)?;
+        (at != NONE).then(|| self.columns[at as usize])
     }
 
     /// Power into the element at a port, sample by sample.
@@ -180,15 +201,24 @@ impl<'a> Values<'a> {
         }
     }
 
+    /// The greatest power at a port, whichever way; 0 where it is not known.
+    pub fn greatest_power(&self, port: PortRef) -> f64 {
+        let bond = self.graph.bond_of(port);
+        let (Some(e), Some(f)) = (self.effort(bond), self.flow(bond)) else { return 0.0 };
+        e.iter().zip(f).fold(0.0, |most, (e, f)| most.max((e * f).abs()))
+    }
+
     /// Reads expressions at samples; the name of what is missing if they read something that was not recorded.
     pub fn reader(&self, wanted: &[Expr]) -> Result<Reader<'_, 'a>, String> {
         let x = &self.graph.exprs;
-        let mut read: BTreeSet<Symbol> = wanted.iter().flat_map(|&e| x.symbols_of(e)).collect();
+        let mut read: Vec<Symbol> = wanted.iter().flat_map(|&e| x.symbols_of(e)).collect();
+        read.sort_unstable();
+        read.dedup();
         // A rate of an integrated signal is the expression that it was declared with.
-        let mut rates = BTreeMap::new();
+        let mut rates: BTreeMap<Symbol, Expr> = BTreeMap::new();
         loop {
-            let more: Vec<(Symbol, Expr)> =
-                read.iter().filter(|s| !rates.contains_key(*s)).filter_map(|&s| Some((s, self.rate_of(s)?))).collect();
+            let new = |s: &Symbol| if rates.contains_key(s) { None } else { Some((*s, self.rate_of(*s)?)) };
+            let more: Vec<(Symbol, Expr)> = read.iter().filter_map(new).collect();
             if more.is_empty() {
                 break;
             }
@@ -196,6 +226,8 @@ impl<'a> Values<'a> {
                 rates.insert(symbol, rate);
                 read.extend(x.symbols_of(rate));
             }
+            read.sort_unstable();
+            read.dedup();
         }
         let known = |s: &Symbol| {
             *s == self.graph.time
@@ -206,7 +238,8 @@ impl<'a> Values<'a> {
         if let Some(missing) = read.iter().find(|s| !known(s)) {
             return Err(x.name(*missing).to_string());
         }
-        let Borders { jumps: jumpy, bends: bent, timed, .. } = self.borders(wanted);
+        let piecewise: Vec<Expr> = wanted.iter().copied().filter(|&e| x.is_piecewise(e)).collect();
+        let Borders { jumps: jumpy, bends: bent, timed, .. } = self.borders(&piecewise);
         let moves = read.iter().copied().filter(|s| !rates.contains_key(s) && self.recorded(*s).is_some()).collect();
         let rates = rates.into_iter().collect();
         Ok(Reader { values: self, wanted: wanted.to_vec(), rates, read: OnceCell::new(), moves, jumpy, bent, timed })
@@ -251,8 +284,9 @@ impl<'a> Values<'a> {
     }
 
     /// All columns by symbol.
-    pub fn columns(&self) -> &BTreeMap<Symbol, &'a [f64]> {
-        &self.columns
+    pub fn columns(&self) -> impl Iterator<Item = (Symbol, &'a [f64])> + '_ {
+        let symbols = (0..self.of.of.len() as u32).map(Symbol);
+        symbols.filter_map(|symbol| Some((symbol, self.column(symbol)?)))
     }
 
     /// On which side of a jump a sample stands. The start is the far side of one, and so is a single sample at the time
@@ -453,7 +487,7 @@ impl Reader<'_, '_> {
 
     /// The values at a sample, symbols moved by so much; `None` where the law is not clear.
     pub fn values(&self, sample: usize, moved: &[(Symbol, f64)]) -> Option<Vec<f64>> {
-        self.values_in(&mut Vec::new(), sample, moved).map(|values| values.iter().map(|&[value]| value).collect())
+        self.values_in(&mut Vec::new(), sample, moved).map(<[f64]>::to_vec)
     }
 
     /// The same in memory that is used again.
@@ -462,7 +496,7 @@ impl Reader<'_, '_> {
         room: &'r mut Vec<[f64; 1]>,
         sample: usize,
         moved: &[(Symbol, f64)],
-    ) -> Option<&'r [[f64; 1]]> {
+    ) -> Option<&'r [f64]> {
         if self.is_unclear(sample) {
             return None;
         }
@@ -478,6 +512,6 @@ impl Reader<'_, '_> {
         let column = |symbol: Symbol, column: &[f64]| {
             [moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)]
         };
-        Some(read.at(&read.wanted, room, [t], &column))
+        Some(read.at(&read.wanted, room, [t], &column).as_flattened())
     }
 }

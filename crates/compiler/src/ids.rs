@@ -152,6 +152,10 @@ impl<K: Id, V: Clone> Map<K, V> {
     pub fn new() -> Self {
         Self::default()
     }
+    /// An empty map with room for ids below a number.
+    pub fn with_capacity(count: usize) -> Self {
+        Map { places: Arc::new(Vec::with_capacity(count)), len: 0 }
+    }
     /// Puts a value in the place of an id; gives what was there.
     pub fn insert(&mut self, id: K, value: V) -> Option<V> {
         let places = Arc::make_mut(&mut self.places);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
 use halfarrow_compiler::bond_graph::{Meaning, NoFiles};
 use halfarrow_compiler::compile::{Text, to_equations};
-use halfarrow_compiler::equations::{EquationStep, Equations, Form};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, LinearBlock, NewtonBlock};
 use halfarrow_compiler::textbook::{Shown, Style, print, print_dependent, print_meanings, show};
 
 fn models() -> Vec<PathBuf> {
@@ -52,14 +52,16 @@ fn values(equations: &Equations, (first, step): (f64, f64)) -> BTreeMap<Symbol, 
                 let value = at(x, *value, &known);
                 known.insert(*symbol, value);
             }
-            EquationStep::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 let (full, right) = (matrix.map(|&e| at(x, e, &known)).dense(0.0), right.iter());
                 let row = |(row, &r): (&[f64], &Expr)| [row, &[at(x, r, &known)]].concat();
                 let solution = solved(full.chunks(unknowns.len()).zip(right).map(row).collect());
                 known.extend(unknowns.iter().copied().zip(solution));
             }
             // What is shown holds for any value of what stays implicit.
-            EquationStep::Newton { unknowns, body, .. } => {
+            EquationStep::Newton(block) => {
+                let NewtonBlock { unknowns, body, .. } = &**block;
                 known.extend(unknowns.iter().enumerate().map(|(i, &u)| (u, 0.17 + 0.31 * i as f64)));
                 for &(symbol, value) in body {
                     let value = at(x, value, &known);

@@ -89,7 +89,7 @@ impl Symbol {
     /// The symbol of an element, if it has one.
     pub fn of(graph: &BondGraph, element: &Element) -> Option<Symbol> {
         let own = element.name.rsplit('.').next().unwrap_or_default();
-        let part = PARTS.iter().find(|(component, name, _)| *component == element.component && *name == own);
+        let part = PARTS.iter().find(|(component, name, _)| **component == *element.component && *name == own);
         let law = graph.set_valued.iter().find(|law| std::ptr::eq(&graph.elements[law.element], element));
         part.map(|part| part.2).or_else(|| law.and_then(|law| Symbol::of_law(law, element)))
     }

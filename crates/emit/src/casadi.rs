@@ -76,7 +76,7 @@ pub fn write(
     let _ = writeln!(text, "INPUTS = {}", names(program.inputs.iter().map(|i| i.name.as_str()).collect()));
     let _ =
         writeln!(text, "PARAMETERS = {}", names(free.iter().map(|&i| program.parameters[i].name.as_str()).collect()));
-    let _ = writeln!(text, "OUTPUTS = {}", names(outputs.iter().map(|&i| program.observed[i].name.as_str()).collect()));
+    let _ = writeln!(text, "OUTPUTS = {}", names(outputs.iter().map(|&i| &*program.observed[i].name).collect()));
     let _ = writeln!(text, "\n# At the start.\nx0 = {:?}\nz0 = {unknowns:?}", start.states);
     let parameters: Vec<f64> = free.iter().map(|&i| start.parameters[i]).collect();
     let _ = writeln!(text, "u0 = {:?}\np0 = {parameters:?}\nk0 = {:?}\n", start.inputs, start.conserved);

@@ -8,8 +8,8 @@ use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{self, NoFiles};
 use halfarrow_compiler::compile::{Text, compile};
 use halfarrow_compiler::diagnostic::Sources;
-use halfarrow_compiler::equations::EquationStep;
 use halfarrow_compiler::equations::Form;
+use halfarrow_compiler::equations::{LinearBlock, NewtonBlock};
 use halfarrow_compiler::sparse::SparseMatrix;
 use halfarrow_exec::Model;
 use halfarrow_sim::fixed_step::FixedMethod;
@@ -49,17 +49,20 @@ fn a_step_takes_no_memory() {
     let x = s.state("x");
     let (u, ue) = s.symbol("u");
     let (three, one) = (s.number(3.0), s.number(1.0));
-    s.step(EquationStep::Linear {
-        unknowns: vec![u],
-        matrix: SparseMatrix::full(vec![vec![three]]),
-        right: vec![x],
-        elements: vec![],
-    });
+    s.step(
+        LinearBlock {
+            unknowns: vec![u],
+            matrix: SparseMatrix::full(vec![vec![three]]),
+            right: vec![x],
+            elements: vec![],
+        }
+        .into(),
+    );
     let (e, ee) = s.symbol("e");
     let exp = s.call(Function::Exp, ee);
     let terms = [exp, ee, ue];
     let residual = s.x.add(&terms);
-    s.step(EquationStep::Newton { unknowns: vec![e], body: vec![], residuals: vec![residual], elements: vec![] });
+    s.step(NewtonBlock { unknowns: vec![e], body: vec![], residuals: vec![residual], elements: vec![] }.into());
     let size = s.call(Function::Abs, x);
     let limit = s.x.call(Function::Min, &[size, one]);
     let rate = s.x.mul(&[ee, limit]);

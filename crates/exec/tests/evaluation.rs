@@ -5,7 +5,7 @@ use halfarrow_compiler::sparse::SparseMatrix;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
-use halfarrow_compiler::equations::EquationStep;
+use halfarrow_compiler::equations::{EquationStep, LinearBlock, NewtonBlock};
 use halfarrow_compiler::program::schedule;
 use halfarrow_exec::Model;
 use halfarrow_sim::{Affected, Events as _, Failure, System};
@@ -74,12 +74,15 @@ fn linear(singular: bool) -> Model {
     let elements = vec![s.element("R1"), s.element("R2")];
     // a u + 3 v = 1; b u + 9 v = 2 with b = 3 a is singular.
     let (one, two, nine) = (s.number(1.0), s.number(2.0), s.number(9.0));
-    s.step(EquationStep::Linear {
-        unknowns: vec![u, v],
-        matrix: SparseMatrix::full(vec![vec![a, three], vec![other, nine]]),
-        right: vec![one, two],
-        elements,
-    });
+    s.step(
+        LinearBlock {
+            unknowns: vec![u, v],
+            matrix: SparseMatrix::full(vec![vec![a, three], vec![other, nine]]),
+            right: vec![one, two],
+            elements,
+        }
+        .into(),
+    );
     s.rate("a", ue);
     s.rate("b", ve);
     s.model()
@@ -125,7 +128,7 @@ fn diode(reverse: bool) -> Sketch {
         s.x.sub(sum, x)
     };
     let elements = vec![s.element("D1")];
-    s.step(EquationStep::Newton { unknowns: vec![e], body: vec![(i, current)], residuals: vec![residual], elements });
+    s.step(NewtonBlock { unknowns: vec![e], body: vec![(i, current)], residuals: vec![residual], elements }.into());
     s.rate("x", ie);
     s.observe("e", ee);
     s
@@ -164,7 +167,7 @@ fn only_accepted_steps_move_the_starting_point() {
     let square = s.x.powi(ye, 2);
     let residual = s.x.sub(square, x);
     let elements = vec![s.element("R1")];
-    s.step(EquationStep::Newton { unknowns: vec![y], body: vec![], residuals: vec![residual], elements });
+    s.step(NewtonBlock { unknowns: vec![y], body: vec![], residuals: vec![residual], elements }.into());
     s.rate("x", ye);
     let mut model = s.model();
     let first = rates(&mut model, 0.0, &[4.0])[0];
@@ -188,7 +191,7 @@ fn a_cubic_law_at_rest_is_solved() {
         let terms = [s.x.mul(&[two, fe]), s.x.mul(&[three, cube])];
         let sum = s.x.add(&terms);
         let residual = s.x.sub(sum, state);
-        s.step(EquationStep::Newton { unknowns: vec![f], body: vec![], residuals: vec![residual], elements: vec![] });
+        s.step(NewtonBlock { unknowns: vec![f], body: vec![], residuals: vec![residual], elements: vec![] }.into());
         s.rate("x", fe);
         let f = rates(&mut s.model(), 0.0, &[x])[0];
         assert!((f - exact).abs() < 1e-15, "{linear} {x}: {f}");

@@ -5,7 +5,7 @@ use halfarrow_compiler::sparse::SparseMatrix;
 
 use common::Sketch;
 use halfarrow_compiler::algebra::Function;
-use halfarrow_compiler::equations::EquationStep;
+use halfarrow_compiler::equations::{LinearBlock, NewtonBlock};
 use halfarrow_compiler::program::{Op, Program};
 use halfarrow_exec::Model;
 use halfarrow_sim::{Events, Method, Options, Sink, System, simulate};
@@ -81,13 +81,13 @@ fn blocks_are_differentiated_by_inputs_time_and_parameters() {
     let one = s.number(1.0);
     let matrix = SparseMatrix::full(vec![vec![k, x], vec![one, u]]);
     let sine = s.call(Function::Sin, t);
-    s.step(EquationStep::Linear { unknowns: vec![a, b], matrix, right: vec![sine, x], elements: vec![] });
+    s.step(LinearBlock { unknowns: vec![a, b], matrix, right: vec![sine, x], elements: vec![] }.into());
     let (c, ce) = s.symbol("c");
     let exp = s.call(Function::Exp, ce);
     let product = s.x.mul(&[k, ae]);
     let terms = [exp, ce, product, be, u];
     let residual = s.x.add(&terms);
-    s.step(EquationStep::Newton { unknowns: vec![c], body: vec![], residuals: vec![residual], elements: vec![] });
+    s.step(NewtonBlock { unknowns: vec![c], body: vec![], residuals: vec![residual], elements: vec![] }.into());
     let rate = s.x.mul(&[ce, be]);
     s.rate("x", rate);
     s.observe("rate", rate);

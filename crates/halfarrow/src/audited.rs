@@ -3,18 +3,20 @@
 mod beside;
 
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use beside::{Auditing as Auditor, Part, Recorded, look};
-use halfarrow_audit::{self as audit, Audit, Finding, wanted};
-use halfarrow_compiler::bond_graph::{BondGraph, Element, Kind};
+use halfarrow_audit::{self as audit, Audit, Finding};
+use halfarrow_compiler::bond_graph::{BondGraph, Kind};
+use halfarrow_compiler::program::Observed;
 use halfarrow_exec as exec;
 use halfarrow_sim::{
     Affected, Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
 };
+use rustc_hash::FxHashMap;
 use serde::Serialize;
 
 use crate::drift::DriftReport;
@@ -86,10 +88,8 @@ struct Book {
     samples: Vec<f64>,
     /// Where the recorded values of the user stand among all.
     shown: Vec<usize>,
-    /// The order in which a value that is not finite is looked for: what sources give comes first.
-    suspects: Vec<usize>,
-    /// How many of these, the first ones, are values of sources.
-    sources: usize,
+    /// What each value is.
+    origins: Vec<Origin>,
     /// What the user records that was infinite, and when first.
     infinite: BTreeMap<usize, f64>,
     /// What is handed out.
@@ -100,25 +100,24 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// Audits what `model` computes; what it records stays what it is.
     pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
         let observed = &model.program().observed;
-        let asked: Vec<String> = model.recorded().iter().map(|&i| observed[i].name.clone()).collect();
-        let available: BTreeSet<&str> = observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.as_str()).collect();
-        let names: Vec<String> = wanted(graph).into_iter().filter(|name| available.contains(name.as_str())).collect();
-        let all: Vec<&str> = names.iter().chain(&asked).map(String::as_str).collect();
+        let asked = model.recorded().to_vec();
+        let mut wanted = Wanted::new(observed, graph);
+        let auditor = audit::Auditor::new(graph, &mut |name| wanted.column_of(name));
+        let Wanted { chosen, origins, .. } = wanted;
+        let names: Vec<Arc<str>> = chosen.iter().map(|&i| observed[i].name.clone()).collect();
+        let all = [chosen, asked].concat();
         let count = all.len();
-        // Every name is known to have a value, so this cannot fail.
-        let _ = model.record(&all);
+        model.record_these(all);
         let known = graph.parameters.values().map(|p| p.name.clone());
         let parameters = known.filter_map(|name| model.parameter(&name).map(|value| (name, value))).collect();
-        let (suspects, sources) = suspects(graph, &names);
         let book = Book {
             recorded: Arc::new(Recorded { parameters, names: names.clone() }),
             shown: (names.len()..count).collect(),
             samples: Vec::new(),
             times: Vec::new(),
-            auditor: Some(Auditor::Here(Box::new(audit::Auditor::new(graph)))),
+            auditor: Some(Auditor::Here(Box::new(auditor))),
             neglected: Vec::new(),
-            suspects,
-            sources,
+            origins,
             infinite: BTreeMap::new(),
             out: Vec::new(),
         };
@@ -149,9 +148,9 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         let mut notes: Vec<String> =
             infinite.map(|(i, time)| format!("`{}` is infinite at t = {time} s", name(i))).collect();
         let grown = match failure {
-            Some(Failure::StepTooSmall { .. }) => self.book.grown(&self.book.suspects, GROWN),
+            Some(Failure::StepTooSmall { .. }) => self.book.grown(&self.book.suspects(|_| true), GROWN),
             // Steps may get past a pole; what grew so far is none of the run's own.
-            None => self.book.grown(&self.book.suspects[..self.book.sources], POLE),
+            None => self.book.grown(&self.book.suspects(|origin| origin == Origin::Source), POLE),
             Some(_) => None,
         };
         if let Some((name, value, time)) = grown {
@@ -161,26 +160,64 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
     }
 }
 
-/// The values of the graph, those that sources give first, then inputs and signals, then all others; and how many sources
-/// give.
-fn suspects(graph: &BondGraph, names: &[String]) -> (Vec<usize>, usize) {
-    let inputs = graph.inputs.values().map(|i| i.name.as_str());
-    let signals = graph.signals.values().map(|s| s.name.as_str()).chain(graph.held.values().map(|h| h.name.as_str()));
-    let signals: BTreeSet<&str> = inputs.chain(signals).collect();
-    let given = |e: &Element| match e.kind {
-        Kind::EffortSource { .. } => Some(format!("{}.e", e.name)),
-        Kind::FlowSource { .. } => Some(format!("{}.f", e.name)),
-        _ => None,
-    };
-    let given: BTreeSet<String> = graph.elements.values().filter_map(given).collect();
-    let rank = |name: &String| match name {
-        source if given.contains(source) => 0,
-        signal if signals.contains(signal.as_str()) => 1,
-        _ => 2,
-    };
-    let mut all: Vec<usize> = (0..names.len()).collect();
-    all.sort_by_cached_key(|&i| rank(&names[i]));
-    (all, names.iter().filter(|name| given.contains(*name)).count())
+/// What a value of the graph is, in the order in which one that is not finite is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Origin {
+    /// What a source gives.
+    Source,
+    /// An input or a signal.
+    Signal,
+    /// Anything else.
+    Other,
+}
+
+/// What the audit asks for of what can be recorded.
+struct Wanted<'p> {
+    /// Where each name that has a value stands among what can be recorded.
+    index_of: FxHashMap<&'p str, u32>,
+    /// What each of these is, and its column, if it has one.
+    known: Vec<(Origin, u32)>,
+    /// What is recorded for the audit, in the order of the columns.
+    chosen: Vec<usize>,
+    origins: Vec<Origin>,
+}
+
+/// The column of what was not asked for yet.
+const NONE: u32 = u32::MAX;
+
+impl<'p> Wanted<'p> {
+    fn new(observed: &'p [Observed], graph: &BondGraph) -> Wanted<'p> {
+        let available = observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
+        let mut index_of = FxHashMap::with_capacity_and_hasher(observed.len(), Default::default());
+        index_of.extend(available.map(|(i, o)| (&*o.name, i as u32)));
+        let mut known = vec![(Origin::Other, NONE); observed.len()];
+        let mut is_a = |name: &str, origin: Origin| {
+            if let Some(&i) = index_of.get(name) {
+                known[i as usize].0 = origin;
+            }
+        };
+        graph.inputs.values().for_each(|i| is_a(&i.name, Origin::Signal));
+        graph.signals.values().for_each(|s| is_a(&s.name, Origin::Signal));
+        graph.held.values().for_each(|h| is_a(&h.name, Origin::Signal));
+        graph.elements.values().for_each(|e| match e.kind {
+            Kind::EffortSource { .. } => is_a(&format!("{}.e", e.name), Origin::Source),
+            Kind::FlowSource { .. } => is_a(&format!("{}.f", e.name), Origin::Source),
+            _ => {}
+        });
+        Wanted { index_of, known, chosen: Vec::new(), origins: Vec::new() }
+    }
+
+    /// The column of a variable, from now on if it had none; `None` if it has no value.
+    fn column_of(&mut self, name: &str) -> Option<usize> {
+        let index = *self.index_of.get(name)? as usize;
+        let (origin, column) = &mut self.known[index];
+        if *column == NONE {
+            *column = self.chosen.len() as u32;
+            self.chosen.push(index);
+            self.origins.push(*origin);
+        }
+        Some(*column as usize)
+    }
 }
 
 /// What knows the values of parameters.
@@ -234,8 +271,16 @@ impl Book {
         if values[..self.recorded.names.len()].iter().all(|value| value.is_finite()) {
             return None;
         }
-        let found = self.suspects.iter().find(|&&i| !values[i].is_finite());
-        found.map(|&i| self.recorded.names[i].as_str())
+        let found = self.suspects(|_| true).into_iter().find(|&i| !values[i].is_finite());
+        found.map(|i| &*self.recorded.names[i])
+    }
+
+    /// The columns of some origins in the order in which a value that is not finite is looked for.
+    fn suspects(&self, among: impl Fn(Origin) -> bool) -> Vec<usize> {
+        let names = &self.recorded.names;
+        let mut all: Vec<usize> = (0..names.len()).filter(|&i| among(self.origins[i])).collect();
+        all.sort_by_key(|&i| (self.origins[i], &names[i]));
+        all
     }
 
     /// A value that is beyond all it is for half of the time by this factor at its greatest: its name, what it is then, when.
@@ -246,7 +291,7 @@ impl Book {
             let usual = self.usual(&column);
             let grew = usual > 0.0 && column[peak].abs() > factor * usual;
             (grew && (factor < POLE || self.is_sharp(&column, peak)))
-                .then(|| (self.recorded.names[i].as_str(), column[peak], self.times[peak]))
+                .then(|| (&*self.recorded.names[i], column[peak], self.times[peak]))
         })
     }
 

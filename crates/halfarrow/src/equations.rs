@@ -263,8 +263,8 @@ impl Model {
         let (mut linear, mut iterated) = (Vec::new(), Vec::new());
         for step in &equations.steps {
             match step {
-                EquationStep::Linear { unknowns, .. } => linear.push(unknowns.len()),
-                EquationStep::Newton { unknowns, .. } => iterated.push(unknowns.len()),
+                EquationStep::Linear(block) => linear.push(block.unknowns.len()),
+                EquationStep::Newton(block) => iterated.push(block.unknowns.len()),
                 _ => {}
             }
         }

@@ -304,7 +304,7 @@ impl<'a> ExportedProgram<'a> {
             states: p.states.iter().map(|s| s.name.clone()).collect(),
             inputs: p.inputs.iter().map(|i| i.name.clone()).collect(),
             parameters: p.parameters.iter().filter(|p| !p.constant).map(|p| p.name.clone()).collect(),
-            outputs: recorded.iter().map(|&i| p.observed[i].name.clone()).collect(),
+            outputs: recorded.iter().map(|&i| p.observed[i].name.to_string()).collect(),
             ..ExportReport::without_code(&p.name, self.export.target)
         }
     }

@@ -381,7 +381,7 @@ fn reach(known: bool, freedom: usize, level: f64) -> f64 {
 fn fitted_runs(task: &Task<'_>, columns: &search::Columns, residuals: &[f64]) -> Vec<FittedRun> {
     let observed = &task.compiled.minimal().program().observed;
     let unit = |name: &str| {
-        let unit = observed.iter().find(|o| o.name == name).and_then(|o| o.unit.as_ref());
+        let unit = observed.iter().find(|o| *o.name == *name).and_then(|o| o.unit.as_ref());
         unit.map(ToString::to_string).unwrap_or_default()
     };
     let mut left = residuals.iter().copied();

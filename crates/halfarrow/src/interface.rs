@@ -84,7 +84,11 @@ impl Compiled {
                 .collect(),
             states: program.states.iter().map(|s| s.name.clone()).collect(),
             variables: (program.observed.iter().filter(|o| o.value.is_ok()))
-                .map(|o| InterfaceVariable { name: o.name.clone(), unit: text(o.unit.as_ref()), default: o.default })
+                .map(|o| InterfaceVariable {
+                    name: o.name.to_string(),
+                    unit: text(o.unit.as_ref()),
+                    default: o.default,
+                })
                 .collect(),
         }
     }

@@ -280,8 +280,8 @@ impl Blocks {
         let mut blocks = Blocks { newton: BTreeMap::new(), linear: BTreeMap::new() };
         for (place, step) in equations.steps.iter().enumerate() {
             let (kind, unknowns, elements) = match step {
-                EquationStep::Newton { unknowns, elements, .. } => (&mut blocks.newton, unknowns, elements),
-                EquationStep::Linear { unknowns, elements, .. } => (&mut blocks.linear, unknowns, elements),
+                EquationStep::Newton(block) => (&mut blocks.newton, &block.unknowns, &block.elements),
+                EquationStep::Linear(block) => (&mut blocks.linear, &block.unknowns, &block.elements),
                 _ => continue,
             };
             for &element in elements.iter().filter(|e| !graph.elements[**e].kind.is_inner()) {

@@ -227,7 +227,7 @@ impl Model {
             sent: ports.sent,
             lost: ports.lost,
             machine,
-            outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.clone()).collect(),
+            outputs: system.recorded().iter().map(|&i| system.program().observed[i].name.to_string()).collect(),
             modes,
             projections,
             drift,

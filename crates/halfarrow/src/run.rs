@@ -685,6 +685,8 @@ pub(crate) trait Recording {
     fn recorded(&self) -> &[usize];
     /// Chooses what is recorded.
     fn record(&mut self, names: &[&str]) -> Result<(), exec::RecordError>;
+    /// Chooses what is recorded, by indices of what has a value.
+    fn record_these(&mut self, observed: Vec<usize>);
     /// Records everything that has a value.
     fn record_all(&mut self);
     /// How it runs from now on.
@@ -704,6 +706,9 @@ macro_rules! recording {
             }
             fn record(&mut self, names: &[&str]) -> Result<(), exec::RecordError> {
                 self.record(names)
+            }
+            fn record_these(&mut self, observed: Vec<usize>) {
+                self.record_these(observed);
             }
             fn record_all(&mut self) {
                 self.record_all();
@@ -819,7 +824,7 @@ fn empty_trace(system: &impl Recording) -> Trace {
     let observed = &system.program().observed;
     let column = |&i: &usize| {
         let unit = observed[i].unit.as_ref().map(ToString::to_string).unwrap_or_default();
-        (observed[i].name.clone(), unit)
+        (observed[i].name.to_string(), unit)
     };
     Trace::new(system.recorded().iter().map(column))
 }
@@ -945,7 +950,7 @@ pub(crate) fn choose(system: &mut impl Recording, record: &Record) -> Result<Vec
         Record::Default => Ok(left_out(system, true)),
         Record::Also(more) => {
             let observed = system.program().observed.iter().filter(|o| o.default && o.value.is_ok());
-            let mut names: Vec<String> = observed.map(|o| o.name.clone()).collect();
+            let mut names: Vec<String> = observed.map(|o| o.name.to_string()).collect();
             more.iter().for_each(|name| {
                 if !names.contains(name) {
                     names.push(name.clone())
@@ -976,7 +981,7 @@ fn left_out(system: &impl Recording, only_default: bool) -> Vec<String> {
 pub(crate) fn refused(system: &impl Recording, error: exec::RecordError) -> Problem {
     match error {
         exec::RecordError::Unknown(name) => {
-            let known = system.program().observed.iter().map(|o| o.name.as_str());
+            let known = system.program().observed.iter().map(|o| &*o.name);
             Problem::UnknownVariable { nearest: nearest(&name, known).map(str::to_string), name }
         }
         exec::RecordError::Unavailable(name, why) => Problem::Unavailable { name, reason: why.to_string() },

@@ -55,7 +55,7 @@ fn quantity(system: &exec::Model, name: &str) -> Result<By, Problem> {
     let parameter = program.parameters.iter().any(|p| p.name == name);
     if let Some(variable) = name.strip_suffix("(0)").filter(|_| !parameter) {
         let given = || program.start.iter().enumerate().filter(|(_, c)| !c.firm);
-        let unit = program.observed.iter().find(|o| o.name == variable).and_then(|o| o.unit.as_ref());
+        let unit = program.observed.iter().find(|o| *o.name == *variable).and_then(|o| o.unit.as_ref());
         let open = |i: &usize| program.start.iter().all(|c| !c.reads.contains(&(*i as u32)));
         let free = || (0..program.states.len()).filter(open);
         if let Some(state) = free().find(|&i| program.states[i].name == variable) {

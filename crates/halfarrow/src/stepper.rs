@@ -199,7 +199,7 @@ impl Stepper {
     /// Names of all that can be read, with their units.
     pub fn readable(&self) -> impl Iterator<Item = (&str, Option<&Unit>)> {
         let program: &Program = self.system.program();
-        program.observed.iter().filter(|o| o.value.is_ok()).map(|o| (o.name.as_str(), o.unit.as_ref()))
+        program.observed.iter().filter(|o| o.value.is_ok()).map(|o| (&*o.name, o.unit.as_ref()))
     }
 
     /// All that the run needs to go on from here.
@@ -250,13 +250,13 @@ impl Stepper {
     /// Where a variable stands among those that are computed.
     fn place(&self, name: &str) -> Option<usize> {
         let observed = &self.system.program().observed;
-        self.system.recorded().iter().position(|&i| observed[i].name == name)
+        self.system.recorded().iter().position(|&i| *observed[i].name == *name)
     }
 
     /// Adds a variable to those that are computed; gives its place.
     fn take_along(&mut self, name: &str) -> Result<usize, Problem> {
         let observed = &self.system.program().observed;
-        let mut names: Vec<String> = self.system.recorded().iter().map(|&i| observed[i].name.clone()).collect();
+        let mut names: Vec<String> = self.system.recorded().iter().map(|&i| observed[i].name.to_string()).collect();
         names.push(name.to_string());
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         self.system.record(&names).map_err(|error| refused(&self.system, error))?;

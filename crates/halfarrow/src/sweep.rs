@@ -553,7 +553,7 @@ fn reducers(sweep: &Sweep, system: &mut exec::Model) -> Result<Vec<Reducers>, Pr
     let units = units(system);
     let of = |(&i, unit): (&usize, Option<Unit>)| {
         let name = &system.program().observed[i].name;
-        let wanted = sweep.reduce.iter().filter(|r| r.variable == *name).map(|r| r.reduction).collect();
+        let wanted = sweep.reduce.iter().filter(|r| *r.variable == **name).map(|r| r.reduction).collect();
         Reducers::new(name, unit, if sweep.reduce.is_empty() { vec![Reduction::Final] } else { wanted })
     };
     Ok(system.recorded().iter().zip(units).map(of).collect())

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 use halfarrow::{
     AuditReport, Compare, Error, Failure, FixedMethod, Form, Method, Model, Override, RealTimeRun, Record, Reduce, Run,
@@ -353,8 +354,10 @@ impl Files for Library {
 type Columns = BTreeMap<String, Vec<f64>>;
 
 fn audited(graph: &BondGraph, times: &[f64], columns: &Columns) -> halfarrow_audit::Audit {
-    let columns = columns.iter().map(|(name, c)| (name.clone(), c.as_slice())).collect();
-    halfarrow_audit::audit(graph, &halfarrow_audit::Run { times, columns: &columns, parameters: &BTreeMap::new() })
+    let names: Vec<Arc<str>> = columns.keys().map(|name| name.as_str().into()).collect();
+    let columns: Vec<&[f64]> = columns.values().map(Vec::as_slice).collect();
+    let run = halfarrow_audit::Run { times, names: &names, columns: &columns, parameters: &BTreeMap::new() };
+    halfarrow_audit::audit(graph, &run)
 }
 
 fn greatest(column: &[f64]) -> f64 {

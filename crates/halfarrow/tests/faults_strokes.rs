@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use halfarrow::{Form, Method, Model, Record, Run};
 use halfarrow_compiler::bond_graph::{self, ElementId, Kind, NoFiles};
@@ -111,9 +112,11 @@ fn the_audit_sees_a_constraint_at_the_wrong_junction() {
     let (causal, _) = causal(&wrong);
     let mut graph = causal.graph.clone();
     let values = run(&from_text(&wrong), Form::Minimal, 1.0);
-    let columns: BTreeMap<String, &[f64]> = values.iter().map(|(name, v)| (name.clone(), &v[..])).collect();
+    let names: Vec<Arc<str>> = values.keys().map(|name| name.as_str().into()).collect();
+    let columns: Vec<&[f64]> = values.values().map(|v| &v[..]).collect();
     let parameters = BTreeMap::new();
-    let samples = halfarrow_audit::Run { times: &[0.0, 1.0], columns: &columns, parameters: &parameters };
+    let samples =
+        halfarrow_audit::Run { times: &[0.0, 1.0], names: &names, columns: &columns, parameters: &parameters };
     let miss =
         |graph: &bond_graph::BondGraph| halfarrow_audit::audit(graph, &samples).residual.map_or(0.0, |f| f.value);
     assert!(miss(&graph) < 1e-12);

@@ -6,6 +6,9 @@ use super::node::{Expr, Node};
 /// Bits of a rational beyond which it is long: literals of 17 digits have about 110, products of two less than this.
 const LONG_NUMBER: u64 = 256;
 
+/// No entry of an expression adds more to its written length.
+const LONGEST: u64 = 8;
+
 /// Operations of one evaluation, shared parts counted once.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cost {
@@ -31,7 +34,8 @@ impl Exprs {
     /// into each other grow without bound, though they are printed and computed with the digits of one.
     pub fn is_longer(&self, e: Expr, length: u64) -> bool {
         let is_long = |part: Expr| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER);
-        self.written_length(e) > length || self.around_wholes(&[e]).into_iter().any(is_long)
+        let may_be = LONGEST * u64::from(self.entry(e).size) > length;
+        may_be && self.written_length(e) > length || self.around_wholes(&[e]).into_iter().any(is_long)
     }
 
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1

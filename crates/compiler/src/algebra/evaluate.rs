@@ -4,7 +4,6 @@ use super::exprs::Exprs;
 use super::math;
 use super::node::{Expr, Function, Node, Symbol};
 use rustc_hash::FxHashMap;
-use std::collections::BTreeMap;
 
 /// Values of expressions at one point; what they share is evaluated once.
 ///
@@ -161,16 +160,20 @@ impl Exprs {
     /// The value at the given parameters; `None` if the expression reads anything that is not given.
     pub fn given_value(&self, e: Expr) -> Option<f64> {
         // What a parameter is given by was there before the parameter: no cycles.
-        let mut known: BTreeMap<Symbol, f64> = BTreeMap::new();
+        let mut known = self.told.given();
         let mut open: Vec<Symbol> = self.symbols_of(e).into_iter().collect();
         while let Some(&symbol) = open.last() {
-            let given = self.facts(symbol).given?;
-            let missing: Vec<Symbol> = self.symbols_of(given).into_iter().filter(|s| !known.contains_key(s)).collect();
-            if missing.is_empty() {
-                known.insert(symbol, self.eval(given, &mut |s| known[&s]));
+            if known.contains_key(&symbol) {
                 open.pop();
-            } else {
-                open.extend(missing);
+                continue;
+            }
+            let given = self.facts(symbol).given?;
+            let before = open.len();
+            open.extend(self.symbols_of(given).into_iter().filter(|s| !known.contains_key(s)));
+            if open.len() == before {
+                let value = self.eval(given, &mut |s| known[&s]);
+                known.insert(symbol, value);
+                open.pop();
             }
         }
         Some(self.eval(e, &mut |s| known[&s]))

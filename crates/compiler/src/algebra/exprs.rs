@@ -36,7 +36,9 @@ use std::fmt;
 pub struct Exprs {
     pub(super) entries: Grown<PoolEntry>,
     ids: HashTable<u32>,
-    pub(super) symbols: Vec<SymbolEntry>,
+    pub(super) symbols: Grown<SymbolEntry>,
+    /// Each symbol as an expression, once there is one.
+    pub(super) of_symbols: Vec<Option<Expr>>,
     pub(super) by_label: HashTable<u32>,
     /// All symbols that are made of others.
     pub(super) made: FxHashMap<SymbolKind, Symbol>,
@@ -71,7 +73,8 @@ impl Default for Exprs {
         let mut pool = Exprs {
             entries: Grown::default(),
             ids: HashTable::new(),
-            symbols: Vec::new(),
+            symbols: Grown::default(),
+            of_symbols: Vec::new(),
             by_label: HashTable::new(),
             made: FxHashMap::default(),
             texts: Texts::default(),

@@ -24,7 +24,7 @@ impl<T> Grown<T> {
     pub fn push(&mut self, entry: T) {
         self.last.push(entry);
         if self.last.len() == CHUNK {
-            self.full.push(Arc::from(std::mem::take(&mut self.last)));
+            self.full.push(self.last.drain(..).collect());
         }
     }
     /// Number of entries.

@@ -55,6 +55,22 @@ impl Exprs {
         self.invert(zero, ZERO, symbol)
     }
 
+    /// Whether an expression is a sum of which one term is the symbol or a product with it, and no other reads it.
+    pub fn is_plainly_linear(&self, e: Expr, symbol: Symbol) -> bool {
+        let Node::Add(terms) = self.node(e) else { return false };
+        let mut own = terms.iter().filter(|&&t| self.depends_on(t, symbol));
+        let (Some(&term), None) = (own.next(), own.next()) else { return false };
+        match self.node(term) {
+            Node::Symbol(_) => true,
+            Node::Mul(factors) => {
+                let mut own = factors.iter().filter(|&&f| self.depends_on(f, symbol));
+                let (Some(&factor), None) = (own.next(), own.next()) else { return false };
+                matches!(self.node(factor), Node::Symbol(_))
+            }
+            _ => false,
+        }
+    }
+
     /// As `linear_in` for a sum of which one term is the symbol or a product with it; `None` for anything else.
     fn plainly_linear_in(&mut self, e: Expr, symbol: Symbol) -> Option<(Expr, Expr)> {
         let Node::Add(terms) = self.node(e) else { return None };

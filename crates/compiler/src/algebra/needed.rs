@@ -136,16 +136,20 @@ impl Exprs {
             }
         }
         // With what single parameters need most claims hold: these are told in one go.
-        let mut signs = self.signs_by(&(0..self.len() as u32).map(Expr).collect::<Vec<_>>(), &needed, may_change);
+        let mut signs = self.all_signs_by(&needed, may_change);
         for (e, claim) in compound {
-            if signs[&e].within(claim) {
+            if signs[e.0 as usize].within(claim) {
                 continue;
             }
             let below = self.below(&[e], &|_| true);
-            signs.extend(self.signs_by(&below, &needed, may_change));
-            if !signs[&e].within(claim) {
+            let mut look = |needed: &Needed| {
+                let found = self.signs_by(&below, needed, may_change);
+                found.into_iter().for_each(|(part, sign)| signs[part.0 as usize] = sign);
+                signs[e.0 as usize]
+            };
+            if !look(&needed).within(claim) {
                 self.raise(e, &below, claim, &mut needed, may_change);
-                signs.extend(self.signs_by(&below, &needed, may_change));
+                look(&needed);
             }
         }
         needed
@@ -208,19 +212,36 @@ impl Exprs {
     fn signs_by(&self, order: &[Expr], needed: &Needed, may_change: &dyn Fn(Symbol) -> bool) -> FxHashMap<Expr, Signs> {
         let mut known: FxHashMap<Expr, Signs> = FxHashMap::default();
         for &e in order {
-            let entry = self.entry(e);
-            let mut signs = match &entry.node {
-                Node::Symbol(s) if self.facts(*s).given.is_some() && may_change(*s) => {
-                    needed.get(s).copied().unwrap_or(Signs::ANY)
-                }
-                node => self.signs_of(node, &|c| known[&c]),
-            };
-            if self.assumptions.is_divisor(e) {
-                signs = signs.and(Signs::NOT_ZERO);
-            }
+            let signs = self.sign_by(e, &|c| known[&c], needed, may_change);
             known.insert(e, signs);
         }
         known
+    }
+
+    /// The same for all expressions, by their numbers.
+    fn all_signs_by(&self, needed: &Needed, may_change: &dyn Fn(Symbol) -> bool) -> Vec<Signs> {
+        let mut known: Vec<Signs> = Vec::with_capacity(self.len());
+        for e in (0..self.len() as u32).map(Expr) {
+            let signs = self.sign_by(e, &|c| known[c.0 as usize], needed, may_change);
+            known.push(signs);
+        }
+        known
+    }
+
+    fn sign_by(
+        &self,
+        e: Expr,
+        known: &dyn Fn(Expr) -> Signs,
+        needed: &Needed,
+        may_change: &dyn Fn(Symbol) -> bool,
+    ) -> Signs {
+        let signs = match &self.entry(e).node {
+            Node::Symbol(s) if self.facts(*s).given.is_some() && may_change(*s) => {
+                needed.get(s).copied().unwrap_or(Signs::ANY)
+            }
+            node => self.signs_of(node, known),
+        };
+        if self.assumptions.is_divisor(e) { signs.and(Signs::NOT_ZERO) } else { signs }
     }
 }
 

@@ -87,7 +87,12 @@ impl Exprs {
         self.claims(e, Signs::NOT_ZERO, Decided::NOT_ZERO)
     }
 
-    /// The same, to choose by: nothing is decided by it yet.
+    /// Whether the expression holds corners or jumps.
+    pub fn is_piecewise(&self, e: Expr) -> bool {
+        self.entry(e).properties.piecewise
+    }
+
+    /// The same as [`nonzero`](Self::nonzero), to choose by: nothing is decided by it yet.
     pub fn is_known_nonzero(&self, e: Expr) -> bool {
         self.signs(e).within(Signs::NOT_ZERO)
     }

@@ -13,6 +13,8 @@ pub(super) struct SetId(u32);
 
 /// Larger sets are not kept but found by walking the expression.
 const LARGEST: usize = 48;
+/// Unions of so many symbols are made again and again: looking for them costs as much.
+const SMALL: usize = 8;
 const EMPTY: SetId = SetId(0);
 const LARGE: SetId = SetId(1);
 
@@ -40,6 +42,10 @@ impl SymbolSets {
         (id != LARGE).then(|| members(&self.members, &self.ends, id.0))
     }
 
+    fn len(&self, id: SetId) -> usize {
+        members(&self.members, &self.ends, id.0).len()
+    }
+
     fn intern(&mut self, symbols: &[Symbol]) -> SetId {
         if symbols.len() > LARGEST {
             return LARGE;
@@ -65,6 +71,9 @@ impl SymbolSets {
         }
         if a == LARGE || b == LARGE {
             return LARGE;
+        }
+        if self.len(a) + self.len(b) <= SMALL {
+            return self.union_of([a, b].into_iter());
         }
         let key = if a.0 < b.0 { (a, b) } else { (b, a) };
         if let Some(&known) = self.unions.get(&key) {
@@ -191,8 +200,9 @@ impl Exprs {
         if !enter(self, e) {
             return;
         }
-        let mut seen = FxHashSet::from_iter([e]);
-        let mut open = vec![e];
+        let mut seen = Seen::default();
+        seen.insert(e);
+        let mut open: SmallVec<[Expr; FEW]> = SmallVec::from_slice(&[e]);
         while let Some(e) = open.pop() {
             self.node(e).for_each_child(|c| {
                 if seen.insert(c) && enter(self, c) {
@@ -203,35 +213,65 @@ impl Exprs {
     }
 
     /// The entries below the given ones, parts before wholes; what stands inside [`Node::Whole`] left out.
-    pub(super) fn around_wholes(&self, roots: &[Expr]) -> Vec<Expr> {
-        let mut seen: FxHashSet<Expr> = roots.iter().copied().collect();
-        let mut open: Vec<Expr> = roots.to_vec();
+    pub(super) fn around_wholes(&self, roots: &[Expr]) -> SmallVec<[Expr; FEW]> {
+        self.seen_below(roots, &|_| true, &|node| !matches!(node, Node::Whole(_))).into_order()
+    }
+
+    /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept.
+    pub fn below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> Vec<Expr> {
+        self.seen_below(roots, keep, &|_| true).into_order().into_vec()
+    }
+
+    fn seen_below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool, opens: &dyn Fn(&Node) -> bool) -> Seen {
+        let mut seen = Seen::default();
+        let mut open: SmallVec<[Expr; FEW]> = SmallVec::new();
+        for &root in roots {
+            if keep(root) && seen.insert(root) {
+                open.push(root);
+            }
+        }
         while let Some(e) = open.pop() {
-            if !matches!(self.node(e), Node::Whole(_)) {
-                self.node(e).for_each_child(|c| {
-                    if seen.insert(c) {
+            let node = self.node(e);
+            if opens(node) {
+                node.for_each_child(|c| {
+                    if keep(c) && seen.insert(c) {
                         open.push(c);
                     }
                 });
             }
         }
-        let mut order: Vec<Expr> = seen.into_iter().collect();
-        order.sort_unstable();
-        order
+        seen
+    }
+}
+
+/// Up to so many entries are looked for one by one.
+pub(super) const FEW: usize = 24;
+
+/// Entries that were met: few in a row, many in a table.
+#[derive(Default)]
+struct Seen {
+    few: SmallVec<[Expr; FEW]>,
+    many: FxHashSet<Expr>,
+}
+
+impl Seen {
+    /// Whether it is new.
+    fn insert(&mut self, e: Expr) -> bool {
+        if self.many.is_empty() {
+            if self.few.contains(&e) {
+                return false;
+            }
+            if self.few.len() < FEW {
+                self.few.push(e);
+                return true;
+            }
+            self.many.extend(self.few.drain(..));
+        }
+        self.many.insert(e)
     }
 
-    /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept.
-    pub fn below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> Vec<Expr> {
-        let mut seen: FxHashSet<Expr> = roots.iter().copied().filter(|&r| keep(r)).collect();
-        let mut open: Vec<Expr> = seen.iter().copied().collect();
-        while let Some(e) = open.pop() {
-            self.node(e).for_each_child(|c| {
-                if keep(c) && seen.insert(c) {
-                    open.push(c);
-                }
-            });
-        }
-        let mut order: Vec<Expr> = seen.into_iter().collect();
+    fn into_order(self) -> SmallVec<[Expr; FEW]> {
+        let mut order = if self.many.is_empty() { self.few } else { self.many.into_iter().collect() };
         order.sort_unstable();
         order
     }

@@ -48,8 +48,6 @@ pub(super) struct SymbolEntry {
     /// From the label.
     pub hash: u64,
     kind: SymbolKind,
-    /// The symbol as an expression, once there is one.
-    expr: Option<Expr>,
     facts: Facts,
 }
 
@@ -106,6 +104,9 @@ impl Exprs {
 
     /// A new quantity of that name, or of that name with the first free number from 2 behind it.
     pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
+        if self.find_symbol(name).is_none() {
+            return self.add_symbol(name, name, SymbolKind::Own, facts);
+        }
         let name = self.free_name(name);
         self.add_symbol(&name, &name, SymbolKind::Own, facts)
     }
@@ -179,7 +180,8 @@ impl Exprs {
         };
         let order = self.texts.push_order(label);
         let hash = hash_label(label);
-        self.symbols.push(SymbolEntry { label: at, name, order, hash, kind, expr: None, facts });
+        self.symbols.push(SymbolEntry { label: at, name, order, hash, kind, facts });
+        self.of_symbols.push(None);
         let symbols = &self.symbols;
         self.by_label.insert_unique(hash, id, |&id| symbols[id as usize].hash);
         if kind != SymbolKind::Own {
@@ -245,11 +247,12 @@ impl Exprs {
 
     /// The symbol as an expression.
     pub fn sym(&mut self, symbol: Symbol) -> Expr {
-        if let Some(known) = self.symbols[symbol.0 as usize].expr {
+        let at = symbol.0 as usize;
+        if let Some(known) = self.of_symbols[at] {
             return known;
         }
         let e = self.intern(Node::Symbol(symbol));
-        self.symbols[symbol.0 as usize].expr = Some(e);
+        self.of_symbols[at] = Some(e);
         e
     }
 

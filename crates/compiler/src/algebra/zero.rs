@@ -4,7 +4,7 @@ use super::assumptions::Decided;
 use super::exprs::Exprs;
 use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
-use super::node::{Expr, Node};
+use super::node::{Expr, Node, Symbol};
 use super::precise::{Calls, Point, Verdict};
 use astro_float_num::{BigFloat, Consts};
 use rustc_hash::FxHashMap;
@@ -20,6 +20,8 @@ const TRIED: u64 = 48;
 pub(super) struct Told {
     /// Whether an expression vanishes, in general or at the given parameters.
     vanishes: Mutex<FxHashMap<(Expr, bool), bool>>,
+    /// What is given has these values: parameters that others are given by are evaluated once.
+    given: Mutex<FxHashMap<Symbol, f64>>,
     /// Functions of many digits at the points: most of what a value costs.
     calls: Mutex<Calls>,
 }
@@ -34,6 +36,10 @@ impl Clone for Told {
 impl Told {
     pub(super) fn calls(&self) -> MutexGuard<'_, Calls> {
         self.calls.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn given(&self) -> MutexGuard<'_, FxHashMap<Symbol, f64>> {
+        self.given.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn vanishes(&self) -> MutexGuard<'_, FxHashMap<(Expr, bool), bool>> {

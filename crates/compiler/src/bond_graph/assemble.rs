@@ -225,7 +225,9 @@ impl Builder<'_, '_> {
             Some((Role::Known(meaning), quantity)) => Some((Symbol(at as u32), variable(*meaning, quantity))),
             _ => None,
         });
-        known.collect()
+        let mut all = Map::with_capacity(self.roles.len());
+        all.extend(known);
+        all
     }
 
     /// The SI unit of a quantity, if it is known. Speeds and angles of rotation are shown with their radians: `rad/s` and

@@ -151,9 +151,9 @@ pub(super) struct Pair {
     /// The flow.
     pub flow: Symbol,
     /// Dimension of the effort.
-    pub effort_in: Quantity,
+    pub effort_in: Rc<Quantity>,
     /// Dimension of the flow.
-    pub flow_in: Quantity,
+    pub flow_in: Rc<Quantity>,
 }
 
 /// A graph while it is being built.
@@ -176,7 +176,7 @@ pub(super) struct Builder<'a, 'f> {
     /// Whether something in the tree is missing, which the parser has said.
     pub incomplete: bool,
     /// Role and dimension of every symbol, by its number.
-    pub roles: Vec<Option<(Role, Quantity)>>,
+    pub roles: Vec<Option<(Role, Rc<Quantity>)>>,
     /// Variables of every bond.
     pub pairs: Vec<Pair>,
     /// The bond that stands for each junction, by part.
@@ -243,7 +243,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             faults: Faults::default(),
             repeats: flat.repeats.clone(),
             incomplete: wiring.broken,
-            roles: Vec::new(),
+            roles: Vec::with_capacity(2 * wiring.wires.len() + flat.parts.len()),
             pairs: Vec::with_capacity(wiring.wires.len()),
             moduli: BTreeMap::new(),
             common: representatives(flat, wiring),
@@ -293,17 +293,17 @@ impl<'a, 'f> Builder<'a, 'f> {
     }
 
     /// Says what a symbol means.
-    pub fn mean(&mut self, symbol: Symbol, meaning: Meaning, quantity: Quantity) {
+    pub fn mean(&mut self, symbol: Symbol, meaning: Meaning, quantity: impl Into<Rc<Quantity>>) {
         self.play(symbol, Role::Known(meaning), quantity);
     }
 
     /// Says what the role of a symbol is.
-    pub fn play(&mut self, symbol: Symbol, role: Role, quantity: Quantity) {
+    pub fn play(&mut self, symbol: Symbol, role: Role, quantity: impl Into<Rc<Quantity>>) {
         let at = symbol.0 as usize;
         if self.roles.len() <= at {
             self.roles.resize(at + 1, None);
         }
-        self.roles[at] = Some((role, quantity));
+        self.roles[at] = Some((role, quantity.into()));
     }
 
     /// What a symbol means in the graph; `None` where that is not known yet.
@@ -321,7 +321,7 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// The dimension of a symbol.
     pub fn quantity(&self, symbol: Symbol) -> Quantity {
-        self.roles.get(symbol.0 as usize).and_then(|m| m.as_ref()).map_or(Quantity::Any, |m| m.1.clone())
+        self.roles.get(symbol.0 as usize).and_then(|m| m.as_ref()).map_or(Quantity::Any, |m| Quantity::clone(&m.1))
     }
 
     /// A new symbol of that name, or of one like it if that is taken.

@@ -55,7 +55,7 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
     overrides::refuse_idle(&given, &flat, &mut faults);
     let Built { graph, faults: more, uses } = match flat.lost {
         true => Built::default(),
-        false => wired(&flat, &sources, files, &mut faults, &title),
+        false => wired(&mut flat, &sources, files, &mut faults, &title),
     };
     faults.extend(more);
     faults.extend(graph.iter().flat_map(super::guesses::idle));
@@ -69,8 +69,15 @@ pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: 
 }
 
 /// Connects the bonds of a flat model and builds its graph, as far as its faults allow.
-fn wired(flat: &Flat<'_>, sources: &Sources, files: &dyn Files, faults: &mut Vec<Diagnostic>, title: &Title) -> Built {
+fn wired(
+    flat: &mut Flat<'_>,
+    sources: &Sources,
+    files: &dyn Files,
+    faults: &mut Vec<Diagnostic>,
+    title: &Title,
+) -> Built {
     let mut wiring = wire(flat);
+    flat.drawn = Vec::new();
     faults.extend(std::mem::take(&mut wiring.faults).into_list());
     let faulty = faults.iter().any(Diagnostic::is_error);
     build(flat, &wiring, sources, files, faulty, title, &BTreeSet::new())

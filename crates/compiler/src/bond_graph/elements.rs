@@ -60,16 +60,16 @@ impl<'a> Builder<'a, '_> {
             Word::ResidualSe => self.residual(part).map(|residual| Kind::ResidualEffort { residual }),
             Word::ResidualSf => self.residual(part).map(|residual| Kind::ResidualFlow { residual }),
             Word::Tf if matches!(p.width, Width::Matrix { .. }) => {
-                self.matrix_modulus(part, &["m", "f_out"]).map(Kind::MatrixTransformer)
+                self.matrix_modulus(part, &["m", "f_out"]).map(|matrix| Kind::MatrixTransformer(Box::new(matrix)))
             }
             Word::Gy if matches!(p.width, Width::Matrix { .. }) => {
-                self.matrix_modulus(part, &["r", "e_out"]).map(Kind::MatrixGyrator)
+                self.matrix_modulus(part, &["r", "e_out"]).map(|matrix| Kind::MatrixGyrator(Box::new(matrix)))
             }
             Word::Skew => self.skew_gyrator(part).map(Kind::SkewGyrator),
             Word::Tf => self.modulus(part, ["m", "f_out", "e_out"]).map(|modulus| Kind::Transformer { modulus }),
             Word::Gy => self.modulus(part, ["r", "e_out", "f_out"]).map(|modulus| Kind::Gyrator { modulus }),
-            Word::I => self.storage(part).map(Kind::Inertance),
-            Word::C => self.storage(part).map(Kind::Compliance),
+            Word::I => self.storage(part).map(|storage| Kind::Inertance(Box::new(storage))),
+            Word::C => self.storage(part).map(|storage| Kind::Compliance(Box::new(storage))),
             Word::R if is_set_valued(&p.ast.args) => self.set_valued_resistor(part),
             Word::R => self.resistor(part).map(Kind::Resistor),
             Word::Sw => self.switch(part),

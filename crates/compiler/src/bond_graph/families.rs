@@ -1,6 +1,7 @@
 //! Names with indices: their elements, found by their indices in one step.
 
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 use std::fmt::Write;
 
 use crate::ast;
@@ -8,15 +9,65 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 
 /// Indices of an element; none of what has none.
-pub(super) type Indices = Box<[i64]>;
+pub(super) type Indices = SmallVec<[i64; 2]>;
 
 /// Index of a [`Family`].
 pub(super) type FamilyId = usize;
 
+/// Elements by their indices: those that follow each other by one index in a row, others in a table.
+struct Elements<T> {
+    /// The index of the first in the row.
+    first: i64,
+    row: Vec<T>,
+    others: FxHashMap<Indices, T>,
+}
+
+impl<T> Default for Elements<T> {
+    fn default() -> Self {
+        Elements { first: 0, row: Vec::new(), others: FxHashMap::default() }
+    }
+}
+
+impl<T> Elements<T> {
+    fn get(&self, indices: &[i64]) -> Option<&T> {
+        let in_row = |index: i64| self.row.get(usize::try_from(index.checked_sub(self.first)?).ok()?);
+        match indices {
+            [index] => in_row(*index).or_else(|| self.others.get(indices)),
+            _ => self.others.get(indices),
+        }
+    }
+
+    /// Adds one that is not there.
+    fn insert(&mut self, indices: &[i64], element: T) {
+        match indices {
+            [index] if self.is_empty() || self.first.checked_add(self.row.len() as i64) == Some(*index) => {
+                if self.row.is_empty() {
+                    self.first = *index;
+                }
+                self.row.push(element);
+            }
+            _ => _ = self.others.insert(indices.into(), element),
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.row.len() + self.others.len()
+    }
+
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (Indices, &T)> {
+        let row = self.row.iter().zip(self.first..).map(|(element, index)| (Indices::from_slice(&[index]), element));
+        row.chain(self.others.iter().map(|(indices, element)| (indices.clone(), element)))
+    }
+}
+
 /// What a name with indices stands for.
 pub(super) struct Family<T> {
     /// Its elements.
-    elements: FxHashMap<Indices, T>,
+    elements: Elements<T>,
     /// Least and greatest value of each index.
     ranges: Vec<(i64, i64)>,
     /// Where the first is declared.
@@ -62,13 +113,13 @@ impl<T> Family<T> {
     /// All its elements, in the order of their indices.
     pub fn all(&self) -> impl Iterator<Item = &T> {
         let mut all: Vec<_> = self.elements.iter().collect();
-        all.sort_by(|a, b| a.0.cmp(b.0));
+        all.sort_by(|a, b| a.0.cmp(&b.0));
         all.into_iter().map(|(_, element)| element)
     }
 
     /// One of its elements, that of the least indices.
     pub fn first(&self) -> Option<&T> {
-        self.elements.iter().min_by(|a, b| a.0.cmp(b.0)).map(|(_, element)| element)
+        self.elements.iter().min_by(|a, b| a.0.cmp(&b.0)).map(|(_, element)| element)
     }
 
     /// Whether both have elements of the same indices, as far as their ranges tell.
@@ -113,7 +164,7 @@ impl<T> std::ops::Index<FamilyId> for Families<T> {
 impl<T: Copy> Families<T> {
     /// A family without elements.
     pub fn open(&mut self, indices: usize, span: Span) -> FamilyId {
-        self.0.push(Family { elements: FxHashMap::default(), ranges: vec![(i64::MAX, i64::MIN); indices], span });
+        self.0.push(Family { elements: Elements::default(), ranges: vec![(i64::MAX, i64::MIN); indices], span });
         self.0.len() - 1
     }
 
@@ -126,7 +177,7 @@ impl<T: Copy> Families<T> {
         for (range, index) in family.ranges.iter_mut().zip(indices) {
             *range = (range.0.min(*index), range.1.max(*index));
         }
-        family.elements.insert(indices.into(), element);
+        family.elements.insert(indices, element);
         None
     }
 

@@ -462,9 +462,7 @@ impl<'a> Flat<'a> {
         if element.ports.is_empty() || !element.indices.is_empty() {
             return Some((self.indices(here, &element.indices)?, &element.ports));
         }
-        let known = |r: &mut Repeats<'a>, names: &Names<'a>, name| r.peek(names, here, name).is_some();
-        let number: Vec<bool> = element.ports.iter().map(|p| known(&mut self.repeats, &self.names, p)).collect();
-        if number.iter().all(|known| *known) {
+        if element.ports.iter().all(|p| self.repeats.peek(&self.names, here, p).is_some()) {
             let index = |name| self.repeats.name_as_index(&self.names, here, name);
             return Some((element.ports.iter().map(index).collect::<Option<_>>()?, &[]));
         }
@@ -472,7 +470,7 @@ impl<'a> Flat<'a> {
         if !element.ports.iter().any(variable) {
             return Some((Indices::default(), &element.ports));
         }
-        let port = element.ports.iter().zip(&number).find(|(_, known)| !**known).map(|(p, _)| p)?;
+        let port = element.ports.iter().find(|p| self.repeats.peek(&self.names, here, p).is_none())?;
         let (name, title) =
             (&element.name.text, format!("`{}` is no number known when the model is compiled", port.text));
         let d = Diagnostic::error(codes::N022, title, port.span, "beside an index");

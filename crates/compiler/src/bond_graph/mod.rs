@@ -70,6 +70,7 @@ use crate::algebra::{Expr, Exprs, Symbol};
 use crate::ids::{Map, Table, id};
 use crate::span::Span;
 use crate::unit::Unit;
+use std::sync::Arc;
 
 id!(
     /// An element or junction.
@@ -239,11 +240,11 @@ pub struct Element {
     /// Where it is declared.
     pub span: Span,
     /// The law or value as the modeller wrote it, for drawings: `k = ks`, `e = b*f^3`; empty for junctions.
-    pub label: String,
+    pub label: Arc<str>,
     /// The turn of a repetition that it is made in, if it is.
     pub cell: Option<CellId>,
     /// The component whose text declares it; empty for the model itself.
-    pub component: String,
+    pub component: Arc<str>,
     /// Which of how many it is, counted from 0, if it is one of the junctions, sources or sensors of a multibond.
     pub strand: Option<(u32, u32)>,
 }
@@ -303,9 +304,9 @@ pub enum Kind {
     /// `Df`: reads a flow, takes no effort.
     FlowDetector,
     /// `I`, one port or a field.
-    Inertance(Storage),
+    Inertance(Box<Storage>),
     /// `C`, one port or a field.
-    Compliance(Storage),
+    Compliance(Box<Storage>),
     /// `R`, one port or a field: one law a port.
     Resistor(Vec<ResistorLaw>),
     /// `TF`: `e_in = m e_out`, `f_out = m f_in`.
@@ -319,9 +320,9 @@ pub enum Kind {
         modulus: Expr,
     },
     /// A wide `TF`: `f_out = M f_in`, `e_in = Mᵀ e_out`. Its ports are those at `in`, then those at `out`.
-    MatrixTransformer(Matrix),
+    MatrixTransformer(Box<Matrix>),
     /// A wide `GY` of two sides: `e_out = M f_in`, `e_in = Mᵀ f_out`. Its ports are those at `in`, then those at `out`.
-    MatrixGyrator(Matrix),
+    MatrixGyrator(Box<Matrix>),
     /// A wide `GY` of one side, with a skew matrix `S`: `e = Sᵀ f`, without power; `S` from a momentum `h` by `skew(h)` makes
     /// it an Eulerian junction structure, `e = w × h`. One law a port.
     SkewGyrator(Vec<ResistorLaw>),

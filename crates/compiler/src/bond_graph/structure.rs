@@ -1,5 +1,9 @@
 //! Elements and bonds: as they are drawn, and with the constraints that are built into them.
 
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
 use super::assemble::cell_of;
 use super::builder::Builder;
 use super::multibonds::Width;
@@ -17,33 +21,43 @@ pub(super) struct Structure {
     pub common: Map<ElementId, BondId>,
 }
 
-impl Builder<'_, '_> {
+/// Texts that elements of one statement, or of one component, have in common.
+#[derive(Default)]
+struct Texts<'a> {
+    labels: FxHashMap<Span, Arc<str>>,
+    components: FxHashMap<&'a str, Arc<str>>,
+}
+
+impl<'a> Builder<'a, '_> {
     /// What is drawn, with the laws of its elements.
     pub fn drawn(&self, kinds: Vec<Kind>) -> Structure {
+        let mut texts = Texts::default();
         Structure {
-            elements: kinds.into_iter().enumerate().map(|(part, kind)| self.element(part, kind)).collect(),
+            elements: kinds.into_iter().enumerate().map(|(part, kind)| self.element(part, kind, &mut texts)).collect(),
             bonds: self.wiring.wires.iter().enumerate().map(|(wire, w)| self.bond(wire, w)).collect(),
             common: self.common_bonds(),
         }
     }
 
-    fn element(&self, part: usize, kind: Kind) -> Element {
+    fn element(&self, part: usize, kind: Kind, texts: &mut Texts<'a>) -> Element {
         let p = self.part(part);
-        let ports = self.wiring.ports[part].iter().flatten().enumerate();
-        let ports = ports.map(|(port, (wire, inward))| Port {
+        let wires = self.wiring.ports[part].iter().flatten().enumerate();
+        let mut ports = Vec::with_capacity(self.wiring.ports[part].len());
+        ports.extend(wires.map(|(port, (wire, inward))| Port {
             name: p.port_name(port),
             bond: Self::bond_id(*wire),
             inward: *inward,
-        });
+        }));
         let cell = cell_of(self.flat.names.turn_around(p.here));
-        let (name, label) = (p.name.clone(), self.label(part));
+        let label = texts.labels.entry(p.ast.span).or_insert_with(|| self.label(part).into()).clone();
+        let name = p.name.clone();
         let strand = match p.width {
             Width::Strand(at, of) => Some((at as u32, of as u32)),
             _ => None,
         };
         let component = self.flat.names.scopes[p.here.scope].instance.map_or("", |(component, _)| &component.name.text);
-        let component = component.to_string();
-        Element { name, kind, ports: ports.collect(), span: p.ast.span, label, cell, component, strand }
+        let component = texts.components.entry(component).or_insert_with(|| component.into()).clone();
+        Element { name, kind, ports, span: p.ast.span, label, cell, component, strand }
     }
 
     fn bond(&self, wire: usize, w: &Wire) -> Bond {
@@ -67,9 +81,9 @@ impl Structure {
             kind,
             ports: Vec::new(),
             span,
-            label,
+            label: label.into(),
             cell: None,
-            component: String::new(),
+            component: "".into(),
             strand: None,
         })
     }

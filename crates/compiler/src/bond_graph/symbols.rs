@@ -1,6 +1,7 @@
 //! Names people know for the variables of every bond, and which bonds share their units.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use super::Meaning;
 use super::builder::{Builder, Pair, Role};
@@ -31,12 +32,14 @@ impl Sets {
 impl Builder<'_, '_> {
     /// Makes the symbols of all bonds and stored quantities. In the `parted` bonds a constraint acts.
     pub fn make_symbols(&mut self, parted: &BTreeSet<usize>) {
-        let names = self.bond_names(parted);
+        let named = self.named_by_junctions(parted);
         let units = self.shared_units();
-        for (wire, (effort, flow)) in names.into_iter().enumerate() {
-            let effort = self.fresh(&effort, Facts::default());
-            let flow = self.fresh(&flow, Facts::default());
-            let (effort_in, flow_in) = units[wire].clone();
+        let mut name = String::new();
+        for (wire, (effort_in, flow_in)) in units.into_iter().enumerate() {
+            self.name_of_bond(wire, false, named[wire][0], &mut name);
+            let effort = self.fresh(&name, Facts::default());
+            self.name_of_bond(wire, true, named[wire][1], &mut name);
+            let flow = self.fresh(&name, Facts::default());
             self.mean(effort, Meaning::Effort(Self::bond_id(wire)), effort_in.clone());
             self.mean(flow, Meaning::Flow(Self::bond_id(wire)), flow_in.clone());
             self.pairs.push(Pair { effort, flow, effort_in, flow_in });
@@ -47,6 +50,8 @@ impl Builder<'_, '_> {
     }
 
     fn make_stored(&mut self) {
+        // What one storage holds and the next one mostly have one dimension.
+        let mut last: Option<(Rc<Quantity>, Rc<Quantity>)> = None;
         for part in 0..self.flat.parts.len() {
             let p = self.part(part);
             let letter = match p.word {
@@ -57,7 +62,7 @@ impl Builder<'_, '_> {
                     continue;
                 }
             };
-            let mut symbols = Vec::new();
+            let mut symbols = Vec::with_capacity(self.wiring.ports[part].len());
             for port in 0..self.wiring.ports[part].len() {
                 let name = [&part_name(&p.name, &p.port_name(port)), ".", letter].concat();
                 let symbol = self.fresh(&name, Facts::default());
@@ -65,7 +70,17 @@ impl Builder<'_, '_> {
                     Word::I => self.pairs[w].effort_in.clone(),
                     _ => self.pairs[w].flow_in.clone(),
                 });
-                let quantity = rate.map_or(Quantity::Any, |r| r.times(&Quantity::of(Dim::SECOND)));
+                let quantity = match rate {
+                    Some(rate) => match &last {
+                        Some((known, quantity)) if Rc::ptr_eq(known, &rate) => quantity.clone(),
+                        _ => {
+                            let quantity = Rc::new(rate.times(&Quantity::of(Dim::SECOND)));
+                            last = Some((rate, quantity.clone()));
+                            quantity
+                        }
+                    },
+                    None => Rc::new(Quantity::Any),
+                };
                 self.mean(symbol, Meaning::Stored(Self::port_ref(part, port)), quantity);
                 symbols.push(symbol);
             }
@@ -81,13 +96,14 @@ impl Builder<'_, '_> {
             let flow = self.fresh(&format!("{name}.f"), Facts::default());
             self.play(effort, Role::Reaction, Quantity::Any);
             self.play(flow, Role::Reaction, Quantity::Any);
-            self.reactions.push(Pair { effort, flow, effort_in: Quantity::Any, flow_in: Quantity::Any });
+            let any = Rc::new(Quantity::Any);
+            self.reactions.push(Pair { effort, flow, effort_in: any.clone(), flow_in: any });
         }
     }
 
-    /// Names of effort and flow of every bond.
-    fn bond_names(&self, parted: &BTreeSet<usize>) -> Vec<(String, String)> {
-        let mut names: Vec<(String, String)> = (0..self.wiring.wires.len()).map(|w| self.bond_name(w)).collect();
+    /// The junctions after which effort and flow of every bond are named.
+    fn named_by_junctions(&self, parted: &BTreeSet<usize>) -> Vec<[Option<u32>; 2]> {
+        let mut named = vec![[None; 2]; self.wiring.wires.len()];
         for (junction, p) in self.flat.parts.iter().enumerate().filter(|(_, p)| p.word.is_junction()) {
             let Some(wire) = self.representative(junction) else { continue };
             let w = &self.wiring.wires[wire];
@@ -96,25 +112,37 @@ impl Builder<'_, '_> {
             if !inner(w.from) || !inner(w.to) || elsewhere {
                 continue;
             }
-            match p.word {
-                Word::One => names[wire].1 = [&p.name, ".f"].concat(),
-                _ => names[wire].0 = [&p.name, ".e"].concat(),
-            }
+            named[wire][usize::from(p.word == Word::One)] = Some(junction as u32);
         }
-        names
+        named
     }
 
-    fn bond_name(&self, wire: usize) -> (String, String) {
+    /// What the effort or the flow of a bond is called, put into `name`.
+    fn name_of_bond(&self, wire: usize, flow: bool, junction: Option<u32>, name: &mut String) {
         let w = &self.wiring.wires[wire];
-        let two_port = |(part, port): (usize, usize)| {
-            let p = self.part(part);
-            p.word.is_two_port().then(|| part_name(&p.name, &p.port_name(port)))
-        };
-        let named = (!w.name.is_empty()).then(|| w.name.clone());
-        let base = self.outer_end(wire).or(named).or_else(|| two_port(w.to)).or_else(|| two_port(w.from));
-        match base {
-            Some(base) => ([&base, ".e"].concat(), [&base, ".f"].concat()),
-            None => (self.unused(format!("e{}", wire + 1)), self.unused(format!("f{}", wire + 1))),
+        name.clear();
+        let outer = |(part, _): (usize, usize)| !self.part(part).word.is_inner();
+        let two_port = |(part, _): (usize, usize)| self.part(part).word.is_two_port();
+        let find = |fits: &dyn Fn((usize, usize)) -> bool| [w.to, w.from].into_iter().find(|&end| fits(end));
+        match (junction, find(&outer), w.name.as_str(), find(&two_port)) {
+            (Some(junction), ..) => name.push_str(&self.part(junction as usize).name),
+            (None, Some(end), ..) | (None, None, "", Some(end)) => self.push_port(end, name),
+            (None, None, "", None) => {
+                let letter = if flow { "f" } else { "e" };
+                name.push_str(&self.unused(format!("{letter}{}", wire + 1)));
+                return;
+            }
+            (None, None, own, _) => name.push_str(own),
+        }
+        name.push_str(if flow { ".f" } else { ".e" });
+    }
+
+    /// Adds the name of a port of a part.
+    fn push_port(&self, (part, port): (usize, usize), name: &mut String) {
+        let p = self.part(part);
+        match p.port_name(port).as_str() {
+            "" => name.push_str(&p.name),
+            port => name.push_str(&part_name(&p.name, port)),
         }
     }
 
@@ -126,20 +154,8 @@ impl Builder<'_, '_> {
         }
     }
 
-    /// Name of the port of the element at the end of a bond that is outside of the junction structure.
-    fn outer_end(&self, wire: usize) -> Option<String> {
-        let w = &self.wiring.wires[wire];
-        [w.to, w.from].into_iter().find_map(|(part, port)| {
-            let p = self.part(part);
-            if p.word.is_junction() || p.word.is_two_port() {
-                return None;
-            }
-            Some(part_name(&p.name, &p.port_name(port)))
-        })
-    }
-
     /// Dimensions of effort and flow of every bond: bonds at one junction share them.
-    fn shared_units(&mut self) -> Vec<(Quantity, Quantity)> {
+    fn shared_units(&mut self) -> Vec<(Rc<Quantity>, Rc<Quantity>)> {
         let wires = self.wiring.wires.len();
         let mut sets = Sets((0..wires).collect());
         for (part, p) in self.flat.parts.iter().enumerate().filter(|(_, p)| p.word.is_junction()) {
@@ -150,7 +166,7 @@ impl Builder<'_, '_> {
             }
         }
         let pseudo = self.pseudo_wires(&mut sets);
-        let mut units: Vec<Option<(Quantity, Quantity)>> = vec![None; wires];
+        let mut units: Vec<Option<(Rc<Quantity>, Rc<Quantity>)>> = vec![None; wires];
         for wire in 0..wires {
             let root = sets.find(wire);
             if units[root].is_none() {
@@ -159,11 +175,11 @@ impl Builder<'_, '_> {
                     true => Quantity::var(self.dims.unknown()),
                     false => Quantity::of(Dim::WATT).over(&flow),
                 };
-                units[root] = Some((effort, flow));
+                units[root] = Some((Rc::new(effort), Rc::new(flow)));
             }
             units[wire] = units[root].clone();
         }
-        units.into_iter().map(|u| u.unwrap_or((Quantity::Any, Quantity::Any))).collect()
+        units.into_iter().map(|u| u.expect("every bond has its set")).collect()
     }
 
     /// Whether a bond carries no power: it, or one that shares its junctions, is drawn in a pseudo domain, or ends at an

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{BondGraph, HeldSignal, IntegratedSignal, Kind, Meaning, PortRef, Storage};
+use super::{BondGraph, HeldSignal, IntegratedSignal, Kind, Meaning, PortRef};
 use crate::algebra::{Expr, Symbol};
 use crate::ids::Id;
 
@@ -72,7 +72,8 @@ fn elements(graph: &BondGraph) -> Result<(), String> {
         if !fine {
             return Err(format!("the ports of `{name}` do not fit a {}", element.kind.word()));
         }
-        if let Kind::Inertance(Storage { stored, .. }) | Kind::Compliance(Storage { stored, .. }) = &element.kind {
+        if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
+            let stored = &storage.stored;
             for (i, symbol) in stored.iter().enumerate() {
                 let at = PortRef { element: id, port: i as u32 };
                 if graph.variables.get(symbol).is_none_or(|v| v.meaning != Meaning::Stored(at)) {

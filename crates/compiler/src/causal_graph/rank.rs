@@ -182,9 +182,9 @@ fn detect(graph: &mut BondGraph, symbol: Symbol) -> Option<PortRef> {
         kind,
         ports,
         span,
-        label: String::new(),
+        label: "".into(),
         cell: None,
-        component: String::new(),
+        component: "".into(),
         strand: None,
     };
     let (inner, outer) = match effort {

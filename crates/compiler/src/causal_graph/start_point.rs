@@ -72,7 +72,7 @@ fn given(graph: &BondGraph) -> Vec<(Symbol, Expr)> {
 
 fn storages(graph: &BondGraph) -> impl Iterator<Item = &Storage> {
     graph.elements.values().filter_map(|element| match &element.kind {
-        Kind::Inertance(storage) | Kind::Compliance(storage) => Some(storage),
+        Kind::Inertance(storage) | Kind::Compliance(storage) => Some(&**storage),
         _ => None,
     })
 }

@@ -2,15 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use petgraph::algo::tarjan_scc;
+use petgraph::algo::TarjanScc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
-use super::EquationStep;
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
 use super::supports::Supports;
 use super::symmetry::mirrored;
+use super::{EquationStep, LinearBlock, NewtonBlock};
 use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
@@ -65,9 +66,9 @@ pub struct LinearRow {
 
 /// Puts the definitions of `symbols` into evaluation order. Loops are preferably torn at the variables in `first`.
 pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) -> Result<Ordered, Insoluble> {
-    let mut ordered = Ordered::default();
+    let mut ordered = Ordered { steps: Vec::with_capacity(symbols.len()), ..Ordered::default() };
     let mut zeros: BTreeMap<Symbol, Expr> = BTreeMap::new();
-    let mut waiting: Vec<Vec<Symbol>> = components(d, symbols);
+    let mut waiting: Vec<Component> = components(d, symbols);
     waiting.reverse();
     while let Some(component) = waiting.pop() {
         if put_in(d, &component, &zeros) && component.len() > 1 {
@@ -82,7 +83,7 @@ pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) 
                 }
                 ordered.steps.push(EquationStep::Assign { symbol: only, value });
             }
-            _ => block(d, component, first, &mut ordered)?,
+            _ => block(d, component.into_vec(), first, &mut ordered)?,
         }
     }
     Ok(ordered)
@@ -111,15 +112,19 @@ fn is_direct(d: &Definitions, symbol: Symbol) -> bool {
 }
 
 /// Strongly connected components of the definitions, those that are read first.
-pub(super) fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Vec<Symbol>> {
+pub(super) fn components(d: &Definitions, symbols: &[Symbol]) -> Vec<Component> {
     let graph = dependency_graph(&d.x, symbols, |s| d.of[&s].expr());
-    let sorted = |nodes: Vec<_>| {
-        let mut set: Vec<Symbol> = nodes.into_iter().map(|n| graph[n]).collect();
-        set.sort();
-        set
-    };
-    tarjan_scc(&graph).into_iter().map(sorted).collect()
+    let mut all = Vec::with_capacity(symbols.len());
+    TarjanScc::new().run(&graph, |nodes| {
+        let mut set: Component = nodes.iter().map(|&n| graph[n]).collect();
+        set.sort_unstable();
+        all.push(set);
+    });
+    all
 }
+
+/// Variables that depend on each other, or one alone.
+pub(super) type Component = SmallVec<[Symbol; 2]>;
 
 /// An edge from every symbol to each symbol that its expression reads.
 fn dependency_graph(x: &Exprs, symbols: &[Symbol], expr: impl Fn(Symbol) -> Expr) -> DiGraph<Symbol, ()> {
@@ -163,7 +168,7 @@ fn block(
     let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
     let Some((named, mut rows)) = forms else {
         let inner = body.clone();
-        ordered.steps.push(EquationStep::Newton { unknowns: torn, body: inner, residuals, elements });
+        ordered.steps.push(NewtonBlock { unknowns: torn, body: inner, residuals, elements }.into());
         ordered.assign(body);
         return Ok(());
     };
@@ -190,7 +195,7 @@ fn block(
             let value = x.div(*right, pivot);
             ordered.steps.push(EquationStep::Assign { symbol: *unknown, value });
         }
-        _ => ordered.steps.push(EquationStep::Linear { unknowns: torn, matrix, right, elements }),
+        _ => ordered.steps.push(LinearBlock { unknowns: torn, matrix, right, elements }.into()),
     }
     ordered.assign(body);
     Ok(())

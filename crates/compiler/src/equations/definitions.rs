@@ -96,7 +96,8 @@ impl<'a> Definitions<'a> {
     pub fn set_root(&mut self, symbol: Symbol, residual: Expr) {
         let definition = match self.solve_for(residual, symbol) {
             Some(value) => {
-                if self.x.linear_in(residual, &[symbol]).is_none() {
+                let plain = self.x.is_plainly_linear(residual, symbol);
+                if !plain && self.x.linear_in(residual, &[symbol]).is_none() {
                     self.written.insert(symbol, residual);
                 }
                 Definition::Explicit(value)

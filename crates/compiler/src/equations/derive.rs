@@ -252,7 +252,7 @@ fn order_equations(
     let guesses = if own_start { observed::guesses(&mut d) } else { Vec::new() };
     let domains = domains::domains(&mut d, &states);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
-        EquationStep::Newton { unknowns, .. } => unknowns.clone(),
+        EquationStep::Newton(block) => block.unknowns.clone(),
         _ => Vec::new(),
     });
     let implicit = implicit.collect();

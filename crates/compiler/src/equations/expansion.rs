@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::EquationStep;
 use super::definitions::{Definition, Definitions};
+use super::{EquationStep, LinearBlock};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 
@@ -51,9 +51,10 @@ pub fn expansions(
                 let value = put_in(&mut d.x, *value, &known);
                 known.insert(*symbol, value);
             }
-            EquationStep::Linear { unknowns, matrix, right, .. }
-                if unknowns.len() <= CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
+            EquationStep::Linear(block)
+                if block.unknowns.len() <= CLOSED && !block.unknowns.iter().any(|u| rates.contains(u)) =>
             {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 let matrix = matrix.map(|&e| put_in(&mut d.x, e, &known)).dense(crate::algebra::ZERO);
                 let matrix: Vec<Vec<Expr>> = matrix.chunks(unknowns.len()).map(<[Expr]>::to_vec).collect();
                 let right: Vec<Expr> = right.iter().map(|&e| put_in(&mut d.x, e, &known)).collect();

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::definitions::Definitions;
-use super::{Algebraic, EquationStep, State, StateKind};
+use super::{Algebraic, EquationStep, LinearBlock, NewtonBlock, State, StateKind};
 use crate::algebra::{Expr, Symbol};
 use crate::causal_paths::Count;
 use crate::causal_paths::numeric::{Row, arbitrary, rank};
@@ -221,7 +221,8 @@ impl<'d, 'a> Linearised<'d, 'a> {
                 self.values.insert(*symbol, value);
                 self.gradients.insert(*symbol, gradient);
             }
-            EquationStep::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 let n = unknowns.len().max(1);
                 let dense = matrix.map(|&e| self.value(e)).dense(0.0);
                 let a: Vec<Vec<f64>> = dense.chunks(n).map(<[f64]>::to_vec).collect();
@@ -244,7 +245,8 @@ impl<'d, 'a> Linearised<'d, 'a> {
                 }
                 self.solved(unknowns, &inverse, &moved);
             }
-            EquationStep::Newton { unknowns, body, residuals, .. } => {
+            EquationStep::Newton(block) => {
+                let NewtonBlock { unknowns, body, residuals, .. } = &**block;
                 let flat = super::blocks::substituted(&mut self.d.x, body, residuals);
                 let slopes: Vec<Vec<f64>> =
                     flat.iter().map(|&r| unknowns.iter().map(|&u| self.slope(r, u)).collect()).collect();
@@ -298,8 +300,9 @@ impl EquationStep {
     pub(super) fn defines(&self, symbol: Symbol) -> bool {
         match self {
             EquationStep::Assign { symbol: own, .. } => *own == symbol,
-            EquationStep::Linear { unknowns, .. } => unknowns.contains(&symbol),
-            EquationStep::Newton { unknowns, body, .. } => {
+            EquationStep::Linear(block) => block.unknowns.contains(&symbol),
+            EquationStep::Newton(block) => {
+                let NewtonBlock { unknowns, body, .. } = &**block;
                 unknowns.contains(&symbol) || body.iter().any(|(own, _)| *own == symbol)
             }
             EquationStep::Guard { .. } => false,

@@ -31,6 +31,7 @@ mod symmetry;
 mod verify;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::algebra::{Assumption, Expr, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortRef};
@@ -263,27 +264,9 @@ pub enum EquationStep {
         value: Expr,
     },
     /// `matrix · unknowns = right`, solved by LU with pivoting; a vanishing pivot stops the run.
-    Linear {
-        /// What is defined.
-        unknowns: Vec<Symbol>,
-        /// The matrix.
-        matrix: SparseMatrix<Expr>,
-        /// Right-hand side.
-        right: Vec<Expr>,
-        /// The elements concerned, for messages.
-        elements: Vec<ElementId>,
-    },
+    Linear(Box<LinearBlock>),
     /// `residuals = 0`, solved by Newton from the previous solution (or `start`); divergence stops the run.
-    Newton {
-        /// What is defined.
-        unknowns: Vec<Symbol>,
-        /// Definitions inside the block, in order, which may read the unknowns.
-        body: Vec<(Symbol, Expr)>,
-        /// The residuals, as many as unknowns, in unknowns, body and what is defined before.
-        residuals: Vec<Expr>,
-        /// The elements concerned, for messages.
-        elements: Vec<ElementId>,
-    },
+    Newton(Box<NewtonBlock>),
     /// `pivot` has been divided by: if it vanishes the run stops.
     Guard {
         /// The expression.
@@ -293,11 +276,49 @@ pub enum EquationStep {
     },
 }
 
+/// Linear equations that are solved together: see [`EquationStep::Linear`].
+#[derive(Debug, Clone)]
+pub struct LinearBlock {
+    /// What is defined.
+    pub unknowns: Vec<Symbol>,
+    /// The matrix.
+    pub matrix: SparseMatrix<Expr>,
+    /// Right-hand side.
+    pub right: Vec<Expr>,
+    /// The elements concerned, for messages.
+    pub elements: Vec<ElementId>,
+}
+
+/// Equations that are solved together by iteration: see [`EquationStep::Newton`].
+#[derive(Debug, Clone)]
+pub struct NewtonBlock {
+    /// What is defined.
+    pub unknowns: Vec<Symbol>,
+    /// Definitions inside the block, in order, which may read the unknowns.
+    pub body: Vec<(Symbol, Expr)>,
+    /// The residuals, as many as unknowns, in unknowns, body and what is defined before.
+    pub residuals: Vec<Expr>,
+    /// The elements concerned, for messages.
+    pub elements: Vec<ElementId>,
+}
+
+impl From<LinearBlock> for EquationStep {
+    fn from(block: LinearBlock) -> EquationStep {
+        EquationStep::Linear(Box::new(block))
+    }
+}
+
+impl From<NewtonBlock> for EquationStep {
+    fn from(block: NewtonBlock) -> EquationStep {
+        EquationStep::Newton(Box::new(block))
+    }
+}
+
 /// A variable that can be recorded.
 #[derive(Debug, Clone)]
 pub struct Observed {
     /// Its name, as `--record` takes it.
-    pub name: String,
+    pub name: Arc<str>,
     /// Its value, or why it has none.
     pub value: Result<Expr, Unavailable>,
     /// SI unit, where known.

@@ -1,5 +1,6 @@
 //! What can be recorded, and what the start has to satisfy.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::hash::BuildHasher;
 
@@ -21,19 +22,22 @@ pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> Str
 
 /// Every variable that can be recorded, states, computed positions and outputs first.
 pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -> Vec<Observed> {
-    let mut all: Vec<Observed> = Vec::new();
-    let mut taken: HashTable<usize> = HashTable::new();
+    let graph = d.graph;
+    let mut count = states.len() + positions.len();
+    variables(graph, &mut |_, _, _| count += 1);
+    let mut all: Vec<Observed> = Vec::with_capacity(count);
+    let mut taken: HashTable<u32> = HashTable::with_capacity(count);
     let hash = |name: &str| FxBuildHasher.hash_one(name);
-    let mut add = |name: String, value, unit, kind, default| {
-        let at = hash(&name);
-        if taken.find(at, |&i| all[i].name == name).is_none() {
-            taken.insert_unique(at, all.len(), |&i| hash(&all[i].name));
-            all.push(Observed { name, value, unit, kind, default });
+    let mut add = |name: &str, value, unit, kind, default| {
+        let at = hash(name);
+        if taken.find(at, |&i| *all[i as usize].name == *name).is_none() {
+            taken.insert_unique(at, all.len() as u32, |&i| hash(&all[i as usize].name));
+            all.push(Observed { name: name.into(), value, unit, kind, default });
         }
     };
     for state in states {
         let value = d.x.sym(state.symbol);
-        add(state.name.clone(), Ok(value), state.unit.clone(), kind_of(d, state), true);
+        add(&state.name, Ok(value), state.unit.clone(), kind_of(d, state), true);
     }
     for position in positions {
         let value = d.x.sym(position.symbol);
@@ -41,46 +45,45 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
             Some(Meaning::Stored(_)) => ObservedKind::Displacement,
             _ => ObservedKind::Signal,
         };
-        add(position.name.clone(), Ok(value), position.unit.clone(), kind, true);
+        add(&position.name, Ok(value), position.unit.clone(), kind, true);
     }
-    let graph = d.graph;
     for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
         for named in list {
             let value = value_of(d, named.value);
-            add(named.name.clone(), value, named.unit.clone(), ObservedKind::Named, default);
+            add(&named.name, value, named.unit.clone(), ObservedKind::Named, default);
         }
     }
     for constraint in &graph.constraints {
         let value = value_of(d, constraint.multiplier);
-        add(format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
+        add(&format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
         if constraint.holonomic {
             let drift = value_of(d, constraint.expr);
-            add(format!("{}.drift", constraint.name), drift, None, ObservedKind::Drift, false);
+            add(&format!("{}.drift", constraint.name), drift, None, ObservedKind::Drift, false);
         }
     }
-    for (name, kind, symbol) in variables(graph) {
+    variables(graph, &mut |name, kind, symbol| {
         let e = d.x.sym(symbol);
         let value = value_of(d, e);
         let unit: Option<Unit> = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
         add(name, value, unit, kind, false);
-    }
+    });
     for signal in graph.signals.values() {
         let e = d.x.sym(signal.symbol);
         let value = value_of(d, e);
-        add(signal.name.clone(), value, signal.unit.clone(), ObservedKind::Signal, false);
+        add(&signal.name, value, signal.unit.clone(), ObservedKind::Signal, false);
     }
     for held in graph.held.values().filter(|h| h.kind.is_discrete()) {
         let e = d.x.sym(held.symbol);
         let unit = graph.variables.get(&held.symbol).and_then(|v| v.unit.clone());
-        add(held.name.clone(), Ok(e), unit, ObservedKind::Signal, held.kind == HeldKind::Discrete);
+        add(&held.name, Ok(e), unit, ObservedKind::Signal, held.kind == HeldKind::Discrete);
     }
     for input in graph.inputs.values() {
         let e = d.x.sym(input.symbol);
-        add(input.name.clone(), Ok(e), input.unit.clone(), ObservedKind::Input, false);
+        add(&input.name, Ok(e), input.unit.clone(), ObservedKind::Input, false);
     }
     for named in graph.shapes.iter().flat_map(Shape::values) {
         let value = value_of(d, named.value);
-        add(named.name.clone(), value, named.unit.clone(), ObservedKind::Named, false);
+        add(&named.name, value, named.unit.clone(), ObservedKind::Named, false);
     }
     all
 }
@@ -131,24 +134,32 @@ fn is_outside(d: &Definitions, symbol: Symbol) -> bool {
     matches!(d.meaning(symbol), Some(Time | Parameter(_) | Input(_) | Held(_)))
 }
 
-/// Names of all efforts, flows and stored quantities, with their symbols.
-fn variables(graph: &BondGraph) -> Vec<(String, ObservedKind, Symbol)> {
+/// Calls `visit` with the names of all efforts, flows and stored quantities, and their symbols.
+fn variables(graph: &BondGraph, visit: &mut dyn FnMut(&str, ObservedKind, Symbol)) {
     use ObservedKind::{Effort, Flow};
-    let mut all = Vec::new();
+    let mut name = String::new();
+    let mut visit = |place: &str, variable: &str, kind, symbol| {
+        name.clear();
+        name.extend([place, variable]);
+        visit(&name, kind, symbol);
+    };
     for element in graph.elements.values() {
         let name = &element.name;
         let bond = |port: usize| &graph.bonds[element.ports[port].bond];
         match &element.kind {
-            Kind::Zero => all.push((format!("{name}.e"), Effort, bond(0).effort)),
-            Kind::One => all.push((format!("{name}.f"), Flow, bond(0).flow)),
+            Kind::Zero => visit(name, ".e", Effort, bond(0).effort),
+            Kind::One => visit(name, ".f", Flow, bond(0).flow),
             kind => {
                 for index in 0..element.ports.len() {
-                    let place = element.part_name(index);
-                    all.push((format!("{place}.e"), Effort, bond(index).effort));
-                    all.push((format!("{place}.f"), Flow, bond(index).flow));
+                    let place = match element.ports[index].name.as_str() {
+                        "" => Cow::Borrowed(name.as_str()),
+                        _ => Cow::Owned(element.part_name(index)),
+                    };
+                    visit(&place, ".e", Effort, bond(index).effort);
+                    visit(&place, ".f", Flow, bond(index).flow);
                     match kind {
-                        Kind::Inertance(s) => all.push((format!("{place}.p"), stored_kind(kind), s.stored[index])),
-                        Kind::Compliance(s) => all.push((format!("{place}.q"), stored_kind(kind), s.stored[index])),
+                        Kind::Inertance(s) => visit(&place, ".p", stored_kind(kind), s.stored[index]),
+                        Kind::Compliance(s) => visit(&place, ".q", stored_kind(kind), s.stored[index]),
                         _ => {}
                     }
                 }
@@ -156,10 +167,9 @@ fn variables(graph: &BondGraph) -> Vec<(String, ObservedKind, Symbol)> {
         }
     }
     for bond in graph.bonds.values().filter(|b| !b.name.is_empty()) {
-        all.push((format!("{}.e", bond.name), Effort, bond.effort));
-        all.push((format!("{}.f", bond.name), Flow, bond.flow));
+        visit(&bond.name, ".e", Effort, bond.effort);
+        visit(&bond.name, ".f", Flow, bond.flow);
     }
-    all
 }
 
 /// Where the search of the start begins; not for what has no value.

@@ -78,7 +78,7 @@ fn define(assembled: &mut Assembled, position: Symbol, constraint: Expr) {
 /// Those of them that iterations find; the others are written down.
 pub(super) fn found_by_iteration(computed: &[Computed], steps: &[EquationStep]) -> BTreeSet<Symbol> {
     let unknowns = steps.iter().flat_map(|step| match step {
-        EquationStep::Newton { unknowns, .. } => &unknowns[..],
+        EquationStep::Newton(block) => &block.unknowns[..],
         _ => &[],
     });
     let computed: BTreeSet<Symbol> = computed.iter().map(|c| c.position.symbol).collect();

@@ -173,10 +173,13 @@ impl<'a> Rows<'a> {
                 || !self.zero.contains(s) && self.givers.get(s).is_some_and(|giver| counts(giver))
         };
         let mut rows: Vec<Vec<Symbol>> = sums.iter().map(|sum| sum.as_ref().to_vec()).collect();
-        let mut reached: BTreeSet<Symbol> = BTreeSet::new();
+        let mut reached: Map<Symbol, ()> = Map::new();
         let mut open: Vec<Symbol> = rows.iter().flatten().copied().collect();
         while let Some(symbol) = open.pop() {
-            let Some(definition) = ports.definitions.get(&symbol).filter(|_| reached.insert(symbol)) else { continue };
+            let Some(definition) = ports.definitions.get(&symbol) else { continue };
+            if reached.insert(symbol, ()).is_some() {
+                continue;
+            }
             let reads = definition.0.iter().map(|t| t.0);
             open.extend(reads.clone());
             rows.push(std::iter::once(symbol).chain(reads).collect());
@@ -186,7 +189,8 @@ impl<'a> Rows<'a> {
             row.sort_unstable();
             row.dedup();
         }
-        let mut left = without_own(&rows);
+        let columns = rows.iter().filter_map(|row| row.last()).map(|s| s.0 as usize + 1).max().unwrap_or(0);
+        let mut left = without_own_columns(&rows, columns, |s| s.0 as usize);
         left.truncate(sums.len());
         left
     }
@@ -247,20 +251,37 @@ fn for_junctions(all: &mut Map<Symbol, Combination>, outputs: &BTreeSet<Symbol>)
 
 /// Rows that are left when rows with a variable of their own are taken away again and again.
 pub fn without_own<C: Ord>(rows: &[Vec<C>]) -> Vec<bool> {
-    let mut holders: BTreeMap<&C, Vec<usize>> = BTreeMap::new();
-    for (r, row) in rows.iter().enumerate() {
-        row.iter().for_each(|column| holders.entry(column).or_default().push(r));
+    let mut columns: Vec<&C> = rows.iter().flatten().collect();
+    columns.sort_unstable();
+    columns.dedup();
+    without_own_columns(rows, columns.len(), |c| columns.partition_point(|known| *known < c))
+}
+
+/// The same where columns have numbers below `columns`.
+fn without_own_columns<C>(rows: &[Vec<C>], columns: usize, number: impl Fn(&C) -> usize) -> Vec<bool> {
+    let mut count = vec![0u32; columns];
+    rows.iter().flatten().for_each(|c| count[number(c)] += 1);
+    // The rows that hold each column, one column after the other: where those of a column end.
+    let mut ends: Vec<u32> = count.iter().scan(0, |sum, n| Some(std::mem::replace(sum, *sum + n))).collect();
+    let mut holders = vec![0u32; rows.iter().map(Vec::len).sum()];
+    for (row, r) in rows.iter().zip(0u32..) {
+        for column in row.iter().map(&number) {
+            holders[ends[column] as usize] = r;
+            ends[column] += 1;
+        }
     }
-    let mut count: BTreeMap<&C, usize> = holders.iter().map(|(&column, holders)| (column, holders.len())).collect();
+    let holders = |column: usize| {
+        let start = if column == 0 { 0 } else { ends[column - 1] };
+        &holders[start as usize..ends[column] as usize]
+    };
     let mut left = vec![true; rows.len()];
-    let mut own: Vec<&C> = count.iter().filter(|c| *c.1 == 1).map(|c| *c.0).collect();
+    let mut own: Vec<usize> = (0..columns).filter(|&column| count[column] == 1).collect();
     while let Some(column) = own.pop() {
-        let Some(&row) = holders[column].iter().find(|&&r| left[r]) else { continue };
-        left[row] = false;
-        for other in &rows[row] {
-            let count = count.get_mut(other).expect("counted");
-            *count -= 1;
-            if *count == 1 {
+        let Some(&row) = holders(column).iter().find(|r| left[**r as usize]) else { continue };
+        left[row as usize] = false;
+        for other in rows[row as usize].iter().map(&number) {
+            count[other] -= 1;
+            if count[other] == 1 {
                 own.push(other);
             }
         }

@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::EquationStep;
 use super::points::{POINTS, ROUNDING, solved, somewhere};
+use super::{EquationStep, LinearBlock};
 use crate::algebra::{Evaluator, Expr, Exprs, Node, Symbol};
 
 /// An entry of a matrix: row, column.
@@ -82,8 +82,8 @@ fn before(x: &Exprs, roots: &[Expr], named: &[(Symbol, Expr)], steps: &[Equation
     for (k, step) in steps.iter().enumerate() {
         match step {
             EquationStep::Assign { symbol, .. } => _ = of.insert(*symbol, k),
-            EquationStep::Linear { unknowns, .. } => of.extend(unknowns.iter().map(|&s| (s, k))),
-            EquationStep::Newton { .. } | EquationStep::Guard { .. } => {}
+            EquationStep::Linear(block) => of.extend(block.unknowns.iter().map(|&s| (s, k))),
+            EquationStep::Newton(_) | EquationStep::Guard { .. } => {}
         }
     }
     let (mut found, mut seen) = (BTreeSet::new(), FxHashSet::default());
@@ -99,7 +99,8 @@ fn before(x: &Exprs, roots: &[Expr], named: &[(Symbol, Expr)], steps: &[Equation
         {
             match &steps[k] {
                 EquationStep::Assign { value, .. } => open.extend(x.symbols_of(*value)),
-                EquationStep::Linear { matrix, right, .. } => {
+                EquationStep::Linear(block) => {
+                    let LinearBlock { matrix, right, .. } = &**block;
                     open.extend(matrix.entries().iter().chain(right).flat_map(|&e| x.symbols_of(e)));
                 }
                 _ => {}
@@ -132,13 +133,14 @@ fn values(
                 let value = evaluate(*value, &known);
                 known.insert(*symbol, value);
             }
-            EquationStep::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 let n = unknowns.len();
                 let full: Vec<f64> = matrix.dense(crate::algebra::ZERO).iter().map(|&e| evaluate(e, &known)).collect();
                 let right = right.iter().map(|&e| evaluate(e, &known)).collect();
                 known.extend(unknowns.iter().copied().zip(solved(n, full, right)));
             }
-            EquationStep::Newton { .. } | EquationStep::Guard { .. } => {}
+            EquationStep::Newton(_) | EquationStep::Guard { .. } => {}
         }
     }
     for &(symbol, value) in named {

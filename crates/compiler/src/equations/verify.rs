@@ -57,7 +57,8 @@ impl EquationStep {
     fn defined(&self) -> Vec<Symbol> {
         match self {
             EquationStep::Assign { symbol, .. } => vec![*symbol],
-            EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns.clone(),
+            EquationStep::Linear(block) => block.unknowns.clone(),
+            EquationStep::Newton(block) => block.unknowns.clone(),
             EquationStep::Guard { .. } => Vec::new(),
         }
     }

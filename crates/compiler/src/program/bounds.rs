@@ -97,7 +97,7 @@ impl Program {
             Measure::Flow | Measure::Gap => ("f", ObservedKind::Flow),
         };
         let name = format!("{}.{port}", self.set_valued[law].name);
-        let unit = self.observed.iter().find(|o| o.name == name).and_then(|o| o.unit.clone());
+        let unit = self.observed.iter().find(|o| *o.name == *name).and_then(|o| o.unit.clone());
         let known = kinds.iter().position(|known| *known == (kind, unit.clone()));
         known.unwrap_or_else(|| {
             kinds.push((kind, unit));

@@ -5,6 +5,7 @@ use super::op::Op;
 use super::values::Reads;
 use super::{Position, Value};
 use crate::ids::Id;
+use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -75,8 +76,8 @@ impl Dataflow<'_> {
     }
 
     /// The union of what values read.
-    fn gathered(self, sets: &[Option<Set>], mut open: Vec<Value>) -> Set {
-        let mut parts: Vec<&Set> = Vec::new();
+    fn gathered(self, sets: &[Option<Set>], mut open: SmallVec<[Value; 4]>) -> Set {
+        let mut parts: SmallVec<[&Set; 4]> = SmallVec::new();
         while let Some(value) = open.pop() {
             match &sets[value.index()] {
                 Some(set) => parts.push(set),
@@ -87,21 +88,21 @@ impl Dataflow<'_> {
     }
 }
 
-fn operands(op: Op) -> Vec<Value> {
-    let mut all = Vec::with_capacity(3);
+fn operands(op: Op) -> SmallVec<[Value; 4]> {
+    let mut all = SmallVec::new();
     op.for_each_operand(|v| all.push(v));
     all
 }
 
-fn union(mut parts: Vec<&Set>) -> Set {
+fn union(mut parts: SmallVec<[&Set; 4]>) -> Set {
     parts.sort_unstable_by_key(|set| (std::cmp::Reverse(set.len()), Rc::as_ptr(set).cast::<u32>()));
     parts.dedup_by(|a, b| Rc::ptr_eq(a, b) || a.is_empty());
     let [first, rest @ ..] = &parts[..] else { return Rc::from([]) };
     if rest.is_empty() {
         return Rc::clone(first);
     }
-    let mut all: Vec<u32> = parts.iter().flat_map(|set| set.iter().copied()).collect();
+    let mut all: SmallVec<[u32; 16]> = parts.iter().flat_map(|set| set.iter().copied()).collect();
     all.sort_unstable();
     all.dedup();
-    if all.len() == first.len() { Rc::clone(first) } else { all.into() }
+    if all.len() == first.len() { Rc::clone(first) } else { Rc::from(&all[..]) }
 }

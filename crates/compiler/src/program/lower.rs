@@ -7,6 +7,7 @@ use super::{BlockId, ConditionId, ConditionKind, Value};
 use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Outside, Rational, Symbol, TableId};
 use crate::ids::Table;
 use rustc_hash::{FxHashMap, FxHashSet};
+use smallvec::SmallVec;
 
 /// Values made of expressions so far.
 pub(super) struct Lowering<'a> {
@@ -113,18 +114,7 @@ impl<'a> Lowering<'a> {
 
     /// What is not lowered yet at and below `e`, parts before wholes.
     fn missing_below(&self, e: Expr) -> Vec<Expr> {
-        let mut seen = rustc_hash::FxHashSet::from_iter([e]);
-        let (mut open, mut order) = (vec![e], vec![e]);
-        while let Some(e) = open.pop() {
-            self.exprs.node(e).for_each_child(|c| {
-                if self.known(c).is_none() && seen.insert(c) {
-                    open.push(c);
-                    order.push(c);
-                }
-            });
-        }
-        order.sort_unstable();
-        order
+        self.exprs.below(&[e], &|e| self.known(e).is_none())
     }
 
     fn node(&mut self, e: Expr) -> Value {
@@ -187,7 +177,7 @@ impl<'a> Lowering<'a> {
     }
 
     /// The sum of terms, each with whether it is subtracted.
-    fn total(&mut self, mut parts: Vec<(bool, Value)>) -> Value {
+    fn total(&mut self, mut parts: SmallVec<[(bool, Value); 4]>) -> Value {
         // A term that is added goes first, so that nothing need be negated.
         if let Some(first) = parts.iter().position(|&(minus, _)| !minus) {
             parts[..=first].rotate_right(1);
@@ -204,8 +194,8 @@ impl<'a> Lowering<'a> {
     fn term(&mut self, unit: UnitId) -> Value {
         match self.sharing.units[unit as usize].clone() {
             Unit::Pair(a, b, turned) => {
-                let parts = vec![(false, self.term(a)), (turned, self.term(b))];
-                self.total(parts)
+                let parts = [(false, self.term(a)), (turned, self.term(b))];
+                self.total(parts.as_slice().into())
             }
             Unit::Sum(terms) => {
                 let parts = terms.into_iter().map(|(minus, unit)| (minus, self.term(unit))).collect();
@@ -235,7 +225,8 @@ impl<'a> Lowering<'a> {
                 (Some(above), below) => (Some(self.quotient(Some(above), below)), None),
                 below => below,
             },
-            Unit::Product(number, factors) => {
+            Unit::Product(product) => {
+                let (number, factors) = *product;
                 let number = if number.is_one() { None } else { Some(self.number(&number)) };
                 let (above, below) = self.factors(&factors);
                 let above = self.times(number, above);
@@ -291,7 +282,7 @@ impl<'a> Lowering<'a> {
     /// The product, with the sign of its number left out if `absolute`.
     fn product(&mut self, e: Expr, factors: &[Expr], absolute: bool) -> Value {
         if let Some(parts) = self.sharing.products.get(&e).cloned() {
-            let units: Vec<UnitId> = parts.units.iter().map(|u| u.1).collect();
+            let units: SmallVec<[UnitId; 8]> = parts.units.iter().map(|u| u.1).collect();
             let (numerator, denominator) = self.factors(&units);
             let value = self.quotient(numerator, denominator);
             return if parts.minus && !absolute { self.neg(value) } else { value };

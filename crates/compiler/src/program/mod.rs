@@ -289,7 +289,7 @@ pub struct Position {
 #[derive(Debug, Clone)]
 pub struct Observed {
     /// Its name.
-    pub name: String,
+    pub name: Arc<str>,
     /// Its value, or why it has none.
     pub value: Result<Value, Unavailable>,
     /// SI unit, where known.

@@ -31,7 +31,7 @@ impl fmt::Display for Program {
         self.print_events(f, &names)?;
         let shown: Vec<_> = self.observed.iter().filter_map(|o| Some((o, o.value.clone().ok()?))).collect();
         let values: Vec<Value> = shown.iter().map(|(_, v)| *v).collect();
-        let told: Vec<String> = shown.iter().map(|(o, _)| o.name.clone()).collect();
+        let told: Vec<String> = shown.iter().map(|(o, _)| o.name.to_string()).collect();
         self.print_routine(f, "recorded", &self.guarded_routine(&values), &names, &told)
     }
 }

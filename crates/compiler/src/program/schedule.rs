@@ -17,7 +17,7 @@ use super::{
 };
 use crate::algebra::{Expr, Function, Node, Symbol};
 use crate::bond_graph::{self, BondGraph, ElementId, Meaning, ParameterId};
-use crate::equations::{self, EquationStep, Equations};
+use crate::equations::{self, EquationStep, Equations, LinearBlock, NewtonBlock};
 use crate::ids::{Id, Table};
 use crate::sparse::SparseMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -55,8 +55,9 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     for (i, step) in equations.steps.iter().enumerate() {
         match step {
             EquationStep::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
-            EquationStep::Linear { unknowns, .. } => unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
-            EquationStep::Newton { unknowns, body, .. } => {
+            EquationStep::Linear(block) => block.unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
+            EquationStep::Newton(block) => {
+                let NewtonBlock { unknowns, body, .. } = &**block;
                 unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
             }
             EquationStep::Guard { .. } => {}
@@ -71,8 +72,9 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
             let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
             match &equations.steps[i] {
                 EquationStep::Assign { value, .. } => roots.push(*value),
-                EquationStep::Linear { matrix, right, .. } => roots.extend(matrix.entries().iter().chain(right)),
-                EquationStep::Newton { body, residuals, .. } => {
+                EquationStep::Linear(block) => roots.extend(block.matrix.entries().iter().chain(&block.right)),
+                EquationStep::Newton(block) => {
+                    let NewtonBlock { body, residuals, .. } = &**block;
                     roots.extend(body.iter().map(|b| &b.1).chain(residuals))
                 }
                 EquationStep::Guard { .. } => {}
@@ -164,10 +166,12 @@ impl Schedule<'_> {
                 let value = self.lower.value(*value);
                 self.lower.define(*symbol, value);
             }
-            EquationStep::Linear { unknowns, matrix, right, elements } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, elements } = &**block;
                 self.linear(unknowns, matrix, right, elements)
             }
-            EquationStep::Newton { unknowns, body, residuals, elements } => {
+            EquationStep::Newton(block) => {
+                let NewtonBlock { unknowns, body, residuals, elements } = &**block;
                 self.newton(unknowns, body, residuals, elements)
             }
             EquationStep::Guard { pivot, elements } => {
@@ -307,7 +311,9 @@ impl Schedule<'_> {
         let count = states.len() as u32;
         let first_position = count + equations.conserved.len() as u32;
         let at_start = Dependence::new(flow, count, (first_position, &positions), &wanted);
-        let dependence = Dependence::new(flow, count, (first_position, &[]), &rates);
+        // What rates read is the same where no position is an unknown of the start.
+        let own = (!positions.is_empty()).then(|| Dependence::new(flow, count, (first_position, &[]), &rates));
+        let dependence = own.as_ref().unwrap_or(&at_start);
         let becomes = clauses.iter().filter(|c| matches!(c.trigger, Trigger::Becomes(_))).map(|c| c.trigger.value());
         let leaps = jumps.iter().filter(|jumps| jumps.leaps).flat_map(events::Jumps::values);
         let sources = held.iter().map(|h| h.source);

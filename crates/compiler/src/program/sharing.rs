@@ -7,9 +7,11 @@
 //! Source: greedy elimination of common pairs, as [Breuer] has it.
 
 use crate::algebra::{Expr, Exprs, Node, Rational};
-use rustc_hash::{FxHashMap, FxHashSet};
+use hashbrown::HashTable;
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::collections::BinaryHeap;
+use std::hash::BuildHasher;
 
 /// A factor or term.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -19,11 +21,11 @@ pub(super) enum Unit {
     /// One over a factor.
     Inverse(Expr),
     /// What parameters alone make of a product: a number above zero times factors.
-    Product(Rational, Vec<UnitId>),
+    Product(Box<(Rational, Vec<UnitId>)>),
     /// A term without its sign.
     Size(Expr),
     /// A sum of terms of parameters alone, each with whether it is subtracted.
-    Sum(Vec<(bool, UnitId)>),
+    Sum(Box<[(bool, UnitId)]>),
     /// Two factors; or two terms, with whether the second is subtracted.
     Pair(UnitId, UnitId, bool),
 }
@@ -37,8 +39,11 @@ pub(super) struct Parts {
     /// Of a product: its sign is turned.
     pub minus: bool,
     /// Factors, or terms with whether they are subtracted.
-    pub units: Vec<(bool, UnitId)>,
+    pub units: Bag,
 }
+
+/// Factors or terms, two of them held in place.
+pub(super) type Bag = SmallVec<[(bool, UnitId); 2]>;
 
 /// How products and sums are put together.
 #[derive(Debug, Default)]
@@ -48,9 +53,9 @@ pub(super) struct Sharing {
     pub sums: FxHashMap<Expr, Parts>,
     /// Expressions of which more than one product takes the reciprocal.
     pub reciprocals: FxHashSet<Expr>,
-    known: FxHashMap<Unit, UnitId>,
+    known: HashTable<UnitId>,
     /// The first of terms that differ in sign alone.
-    sizes: FxHashMap<(Rational, Vec<Expr>), Expr>,
+    sizes: HashTable<Expr>,
 }
 
 /// Products and sums of more parts than this are left as they are.
@@ -91,16 +96,32 @@ pub(super) fn share(x: &Exprs, exprs: &[Expr], varies: &dyn Fn(Expr) -> bool) ->
 
 impl Sharing {
     fn unit(&mut self, unit: Unit) -> UnitId {
-        let next = self.units.len() as UnitId;
-        *self.known.entry(unit).or_insert_with_key(|unit| {
-            self.units.push(unit.clone());
-            next
-        })
+        let Sharing { units, known, .. } = self;
+        let hash = |unit: &Unit| FxBuildHasher.hash_one(unit);
+        let at = hash(&unit);
+        if let Some(&known) = known.find(at, |&id| units[id as usize] == unit) {
+            return known;
+        }
+        let id = units.len() as UnitId;
+        units.push(unit);
+        known.insert_unique(at, id, |&id| hash(&units[id as usize]));
+        id
+    }
+
+    /// The first of the terms that differ from this one in sign alone.
+    fn first_of_size(&mut self, x: &Exprs, term: Expr) -> Expr {
+        let hash = |term: &Expr| FxBuildHasher.hash_one(size(x, term));
+        let (at, own) = (hash(&term), size(x, &term));
+        if let Some(&first) = self.sizes.find(at, |first| size(x, first) == own) {
+            return first;
+        }
+        self.sizes.insert_unique(at, term, hash);
+        term
     }
 
     fn product(&mut self, x: &Exprs, factors: &[Expr], varies: &dyn Fn(Expr) -> bool) -> Parts {
         let (mut minus, mut number) = (false, Rational::from(1));
-        let (mut fixed, mut units) = (Vec::new(), Vec::new());
+        let (mut fixed, mut units) = (Bag::new(), Bag::new());
         for &factor in factors {
             if let Some(n) = x.is_number(factor) {
                 (minus, number) = (n.signum() < 0, n.abs());
@@ -121,31 +142,27 @@ impl Sharing {
         }
         if !(number.is_one() && fixed.is_empty()) {
             let fixed = fixed.into_iter().map(|f| f.1).collect();
-            units.insert(0, (false, self.unit(Unit::Product(number, fixed))));
+            units.insert(0, (false, self.unit(Unit::Product(Box::new((number, fixed))))));
         }
         Parts { minus, units }
     }
 
     fn sum(&mut self, x: &Exprs, terms: &[Expr], varies: &dyn Fn(Expr) -> bool) -> Parts {
-        let (mut fixed, mut units) = (Vec::new(), Vec::new());
+        let (mut fixed, mut units) = (Bag::new(), Bag::new());
         for &term in terms {
-            let one = Rational::from(1);
-            let (minus, size) = match x.node(term) {
-                Node::Number(n) => (n.signum() < 0, (n.abs(), Vec::new())),
-                Node::Mul(factors) => match x.is_number(factors[0]) {
-                    Some(n) => (n.signum() < 0, (n.abs(), factors[1..].to_vec())),
-                    None => (false, (one, factors.to_vec())),
-                },
-                _ => (false, (one, vec![term])),
+            let minus = match x.node(term) {
+                Node::Number(n) => n.signum() < 0,
+                Node::Mul(factors) => x.is_number(factors[0]).is_some_and(|n| n.signum() < 0),
+                _ => false,
             };
-            let first = *self.sizes.entry(size).or_insert(term);
+            let first = self.first_of_size(x, term);
             let part = (minus, self.unit(Unit::Size(first)));
             if varies(term) { units.push(part) } else { fixed.push(part) }
         }
         match fixed.len() {
             0 => {}
             1 => units.push(fixed[0]),
-            _ => units.push((false, self.unit(Unit::Sum(fixed)))),
+            _ => units.push((false, self.unit(Unit::Sum(fixed.into_vec().into())))),
         }
         Parts { minus: false, units }
     }
@@ -153,9 +170,9 @@ impl Sharing {
     /// Makes units of the pairs that are found more than once.
     fn pair_up(&mut self, bags: &mut [(Expr, Parts)]) {
         let mut count: FxHashMap<Pair, usize> = FxHashMap::default();
-        let mut where_: FxHashMap<UnitId, Vec<u32>> = FxHashMap::default();
+        let mut where_: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); self.units.len()];
         for (i, (_, bag)) in bags.iter().enumerate() {
-            bag.units.iter().for_each(|u| where_.entry(u.1).or_default().push(i as u32));
+            bag.units.iter().for_each(|u| where_[u.1 as usize].push(i as u32));
             for (pair, n) in pairs(&bag.units) {
                 *count.entry(pair).or_default() += n;
             }
@@ -172,8 +189,8 @@ impl Sharing {
                 continue;
             }
             let new = self.unit(Unit::Pair(pair.0, pair.1, pair.2));
-            let found_at = |unit: UnitId| where_.get(&unit).map_or(&[][..], |bags| bags);
-            let (first, second) = (found_at(pair.0), found_at(pair.1));
+            where_.resize(self.units.len(), SmallVec::new());
+            let (first, second) = (&where_[pair.0 as usize], &where_[pair.1 as usize]);
             let mut at = if first.len() <= second.len() { first.to_vec() } else { second.to_vec() };
             at.dedup();
             let mut risen = FxHashSet::default();
@@ -191,13 +208,25 @@ impl Sharing {
                     *count.entry(pair).or_default() += n;
                     risen.insert(pair);
                 }
-                let there = where_.entry(new).or_default();
+                let there = &mut where_[new as usize];
                 if there.last() != Some(&i) {
                     there.push(i);
                 }
             }
             heap.extend(risen.into_iter().filter_map(|p| Some(entry(p, count.get(&p).copied().filter(|&n| n > 1)?))));
         }
+    }
+}
+
+/// A term without its sign: the size of its number, and its factors.
+fn size<'x>(x: &'x Exprs, term: &'x Expr) -> (Rational, &'x [Expr]) {
+    match x.node(*term) {
+        Node::Number(n) => (n.abs(), &[]),
+        Node::Mul(factors) => match x.is_number(factors[0]) {
+            Some(n) => (n.abs(), &factors[1..]),
+            None => (Rational::from(1), factors),
+        },
+        _ => (Rational::from(1), std::slice::from_ref(term)),
     }
 }
 
@@ -242,7 +271,7 @@ fn pairs(units: &[(bool, UnitId)]) -> SmallVec<[(Pair, usize); 6]> {
 }
 
 /// Puts `new` in the place of a pair, once; whether the pair was there.
-fn take(units: &mut Vec<(bool, UnitId)>, (a, b, turned): Pair, new: UnitId) -> bool {
+fn take(units: &mut Bag, (a, b, turned): Pair, new: UnitId) -> bool {
     for i in (0..units.len()).filter(|&i| units[i].1 == a).collect::<Vec<_>>() {
         let minus = units[i].0;
         if a == b && minus {

@@ -3,7 +3,9 @@
 use super::Value;
 use super::op::Op;
 use crate::ids::Table;
-use rustc_hash::FxHashMap;
+use hashbrown::HashTable;
+use rustc_hash::FxBuildHasher;
+use std::hash::BuildHasher;
 
 /// On what a value depends, as a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,25 +40,29 @@ impl Reads {
 pub struct Values {
     ops: Table<Value, Op>,
     reads: Vec<Reads>,
-    known: FxHashMap<Op, Value>,
+    known: HashTable<Value>,
 }
 
 impl Values {
     /// The value of an operation; equal operations are one value. For a solution, `reads` is what its block reads.
     pub(super) fn add(&mut self, op: Op, reads: Reads) -> Value {
-        if let Some(&known) = self.known.get(&op) {
+        let Values { ops, known, .. } = self;
+        let hash = |op: &Op| FxBuildHasher.hash_one(op);
+        let at = hash(&op);
+        if let Some(&known) = known.find(at, |&value| ops[value] == op) {
             return known;
         }
         let mut all = reads;
         op.for_each_operand(|v| all = all.with(self.reads(v)));
         self.reads.push(all);
         let value = self.ops.push(op);
-        self.known.insert(op, value);
+        let Values { ops, known, .. } = self;
+        known.insert_unique(at, value, |&value| hash(&ops[value]));
         value
     }
     /// The value of an operation, if there is one.
     pub fn find(&self, op: Op) -> Option<Value> {
-        self.known.get(&op).copied()
+        self.known.find(FxBuildHasher.hash_one(op), |&value| self.ops[value] == op).copied()
     }
     /// The operation of a value.
     pub fn op(&self, value: Value) -> Op {

@@ -6,8 +6,8 @@ use super::named::{named_page, wide_blocks};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{BondGraph, Named};
 use crate::equations::{
-    CLOSED, Definitions, EquationStep, Equations, LinearRow, Ordered, State, expansions, named_sources, put_in,
-    substituted,
+    CLOSED, Definitions, EquationStep, Equations, LinearBlock, LinearRow, NewtonBlock, Ordered, State, expansions,
+    named_sources, put_in, substituted,
 };
 use crate::unit::Unit;
 
@@ -274,7 +274,8 @@ fn equations(
     let mut implicit = Vec::new();
     for step in &ordered.steps {
         match step {
-            EquationStep::Newton { residuals, body, .. } => {
+            EquationStep::Newton(block) => {
+                let NewtonBlock { residuals, body, .. } = &**block;
                 let inner = substituted(&mut d.x, body, residuals);
                 let zero = d.x.int(0);
                 for residual in inner {
@@ -282,9 +283,10 @@ fn equations(
                     implicit.push(equation(left, zero));
                 }
             }
-            EquationStep::Linear { unknowns, matrix, right, .. }
-                if unknowns.len() > CLOSED && !unknowns.iter().any(|u| rates.contains(u)) =>
+            EquationStep::Linear(block)
+                if block.unknowns.len() > CLOSED && !block.unknowns.iter().any(|u| rates.contains(u)) =>
             {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 for (row, &right) in matrix.rows().zip(right) {
                     let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
                     implicit.push(from_row(&mut d.x, &LinearRow { left, right }, known));

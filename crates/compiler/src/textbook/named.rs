@@ -8,7 +8,9 @@ use super::display::{
     put_in_shown,
 };
 use crate::algebra::{Expr, Exprs, Node, ONE, Shared, Symbol};
-use crate::equations::{Definitions, EquationStep, Equations, LinearRow, Ordered, named_sources, put_in};
+use crate::equations::{
+    Definitions, EquationStep, Equations, LinearBlock, LinearRow, NewtonBlock, Ordered, named_sources, put_in,
+};
 use crate::ids::Map;
 
 /// Terms that may be formed in the search for short forms of all equations and definitions together.
@@ -95,7 +97,8 @@ pub fn wide_blocks<'s>(equations: &Equations, steps: &'s [EquationStep]) -> Vec<
     let rates: BTreeSet<Symbol> = equations.states.iter().map(|s| s.rate).collect();
     let told: BTreeSet<Symbol> = equations.algebraic.iter().map(|a| a.symbol).collect();
     let is_wide = |step: &&EquationStep| match step {
-        EquationStep::Linear { unknowns, .. } => {
+        EquationStep::Linear(block) => {
+            let LinearBlock { unknowns, .. } = &**block;
             unknowns.iter().any(|u| rates.contains(u))
                 && unknowns.iter().any(|u| !rates.contains(u) && !told.contains(u))
         }
@@ -187,10 +190,9 @@ impl OpenRows {
                 EquationStep::Assign { symbol, value } if !named.contains_key(symbol) => {
                     _ = values.insert(*symbol, *value)
                 }
-                EquationStep::Linear { unknowns, .. } if unknowns.iter().any(|u| rates.contains(u)) => {}
-                EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => {
-                    blocks.extend(unknowns.iter().map(|&u| (u, step)));
-                }
+                EquationStep::Linear(block) if block.unknowns.iter().any(|u| rates.contains(u)) => {}
+                EquationStep::Linear(block) => blocks.extend(block.unknowns.iter().map(|&u| (u, step))),
+                EquationStep::Newton(block) => blocks.extend(block.unknowns.iter().map(|&u| (u, step))),
                 _ => {}
             }
         }
@@ -222,13 +224,15 @@ impl OpenRows {
 
     fn add_block(&mut self, step: &EquationStep) {
         match step {
-            EquationStep::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 for (row, &right) in matrix.rows().zip(right) {
                     let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
                     self.rows.push(OpenRow::of_row(&LinearRow { left, right }));
                 }
             }
-            EquationStep::Newton { residuals, .. } => {
+            EquationStep::Newton(block) => {
+                let NewtonBlock { residuals, .. } = &**block;
                 self.rows.extend(residuals.iter().map(|&r| OpenRow { symbols: Vec::new(), sides: vec![r] }));
             }
             _ => {}
@@ -283,7 +287,8 @@ impl EquationStep {
     fn unknowns(&self) -> &[Symbol] {
         match self {
             EquationStep::Assign { symbol, .. } => std::slice::from_ref(symbol),
-            EquationStep::Linear { unknowns, .. } | EquationStep::Newton { unknowns, .. } => unknowns,
+            EquationStep::Linear(block) => &block.unknowns,
+            EquationStep::Newton(block) => &block.unknowns,
             EquationStep::Guard { .. } => &[],
         }
     }
@@ -332,7 +337,7 @@ fn recorded(d: &mut Definitions, equations: &Equations) -> BTreeSet<Symbol> {
     for observed in &equations.observed {
         if let Ok(value) = observed.value
             && let Node::Symbol(symbol) = *d.x.node(value)
-            && d.x.name(symbol) == observed.name
+            && d.x.name(symbol) == &*observed.name
         {
             recorded.insert(symbol);
         }

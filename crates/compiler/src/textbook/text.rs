@@ -11,7 +11,7 @@ use crate::algebra::{
 };
 use crate::bond_graph::{Action, BondGraph, Clause, Element, ElementId, Kind, Meaning, Trigger};
 use crate::causal_paths::Refusal;
-use crate::equations::{AlgebraicRole, EquationStep};
+use crate::equations::{AlgebraicRole, EquationStep, LinearBlock, NewtonBlock};
 
 /// Rows of larger systems of equations are written entry by entry.
 const FULL: usize = 32;
@@ -395,7 +395,8 @@ impl Display for Shown {
             match step {
                 EquationStep::Assign { symbol, value } => writeln!(f, "  {} = {}", names.ascii(*symbol), text(*value))?,
                 EquationStep::Guard { pivot, .. } => writeln!(f, "  watch {}", text(*pivot))?,
-                EquationStep::Linear { unknowns, matrix, right, .. } => {
+                EquationStep::Linear(block) => {
+                    let LinearBlock { unknowns, matrix, right, .. } = &**block;
                     writeln!(f, "  solve for {}", list(unknowns, &names))?;
                     for (row, &right) in matrix.rows().zip(right) {
                         let named = |(k, &e): (usize, &Expr)| format!("{}: {}", names.ascii(unknowns[k]), text(e));
@@ -409,7 +410,8 @@ impl Display for Shown {
                         writeln!(f, "    [{}] = {}", row.join(", "), text(right))?;
                     }
                 }
-                EquationStep::Newton { unknowns, body, residuals, .. } => {
+                EquationStep::Newton(block) => {
+                    let NewtonBlock { unknowns, body, residuals, .. } = &**block;
                     writeln!(f, "  iterate for {}", list(unknowns, &names))?;
                     for (symbol, value) in body {
                         writeln!(f, "    {} = {}", names.ascii(*symbol), text(*value))?;

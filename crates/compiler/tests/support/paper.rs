@@ -173,9 +173,9 @@ impl Builder<'_> {
                 kind,
                 ports,
                 span: Span::default(),
-                label,
+                label: label.into(),
                 cell: None,
-                component: String::new(),
+                component: "".into(),
                 strand: None,
             });
         }
@@ -211,8 +211,15 @@ impl Builder<'_> {
                 let flow = self.graph.exprs.sym(flow);
                 Kind::Resistor(vec![ResistorLaw::Resistive(self.graph.exprs.mul(&[value("R"), flow]))])
             }
-            "C" => Kind::Compliance(self.storage(id, "q", |stored, k, exprs| exprs.mul(&[k, stored]), value("C"))),
-            "I" => Kind::Inertance(self.storage(id, "p", |stored, m, exprs| exprs.div(stored, m), value("I"))),
+            "C" => Kind::Compliance(Box::new(self.storage(
+                id,
+                "q",
+                |stored, k, exprs| exprs.mul(&[k, stored]),
+                value("C"),
+            ))),
+            "I" => {
+                Kind::Inertance(Box::new(self.storage(id, "p", |stored, m, exprs| exprs.div(stored, m), value("I"))))
+            }
             other => panic!("unknown kind {other}"),
         }
     }

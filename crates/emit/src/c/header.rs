@@ -38,7 +38,7 @@ pub(super) fn header(plans: &[Plan], names: &Names, cost: &Cost) -> String {
         let kind = if s.constant { ", constant" } else { "" };
         (format!("{}, {value:?} if not set{kind}", s.name), s.unit.as_ref())
     });
-    let outputs = export.recorded.iter().map(|&i| (p.observed[i].name.clone(), p.observed[i].unit.as_ref()));
+    let outputs = export.recorded.iter().map(|&i| (p.observed[i].name.to_string(), p.observed[i].unit.as_ref()));
     let words: Vec<(&str, String)> = vec![
         ("COST_LINES", lines.trim_end().to_string()),
         ("MODEL_NAME", comment(&p.name)),

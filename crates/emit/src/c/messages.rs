@@ -79,7 +79,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
         ("DERIVATIVE_NOT_FINITE", states(&|name| not_finite(format!("the derivative of the rate of {name}")))),
         (
             "OUTPUT_NOT_FINITE",
-            plan.export.recorded.iter().map(|&i| not_finite(p.observed[i].name.clone())).collect(),
+            plan.export.recorded.iter().map(|&i| not_finite(p.observed[i].name.to_string())).collect(),
         ),
         (
             "CONDITION_NOT_FINITE",

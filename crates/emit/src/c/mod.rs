@@ -150,7 +150,7 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
         },
         inputs: list(&mut program.inputs.iter().map(|i| i.name.as_str())),
         parameters: list(&mut program.parameters.iter().map(|p| p.name.as_str())),
-        outputs: list(&mut export.recorded.iter().map(|&i| program.observed[i].name.as_str())),
+        outputs: list(&mut export.recorded.iter().map(|&i| &*program.observed[i].name)),
     };
     let others = export.modes.iter().map(|mode| Export {
         program: &mode.program,

@@ -18,7 +18,7 @@ pub(super) struct Variables {
 impl Variables {
     /// All that can be recorded, and the rates of the states.
     pub fn of(program: &Program, givens: &Givens) -> Variables {
-        let recorded = program.observed.iter().filter_map(|o| Some((o.name.clone(), o.value.clone().ok()?)));
+        let recorded = program.observed.iter().filter_map(|o| Some((o.name.to_string(), o.value.clone().ok()?)));
         let rates = program.states.iter().map(|s| (dotted(&s.name, 1), s.rate));
         let mut variables = Variables::default();
         for (name, value) in recorded.chain(rates) {

@@ -54,7 +54,7 @@ pub fn write(export: &c::Export, version: Version) -> Result<Written, EmitError>
     let program = without_names_of_states(export);
     let export = &c::Export { program: program.as_ref().unwrap_or(export.program), ..*export };
     // States are there anyway: outputs are what else is recorded.
-    let is_state = |&&i: &&usize| export.program.states.iter().any(|s| s.name == export.program.observed[i].name);
+    let is_state = |&&i: &&usize| export.program.states.iter().any(|s| *s.name == *export.program.observed[i].name);
     let at: Vec<usize> = (0..export.recorded.len()).filter(|&k| !is_state(&&export.recorded[k])).collect();
     let recorded: Vec<usize> = at.iter().map(|&k| export.recorded[k]).collect();
     let mut start = export.start.clone();

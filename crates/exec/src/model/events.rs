@@ -373,7 +373,7 @@ impl Events for Model {
         let operand = switches.map(|c| program.conditions[c].operand).nth(indicator);
         // The variables with names that it is nearest to.
         let named: BTreeMap<Value, &str> =
-            program.observed.iter().rev().filter_map(|o| Some((*o.value.as_ref().ok()?, o.name.as_str()))).collect();
+            program.observed.iter().rev().filter_map(|o| Some((*o.value.as_ref().ok()?, &*o.name))).collect();
         let (mut level, mut seen): (Vec<Value>, BTreeSet<Value>) = (operand.into_iter().collect(), BTreeSet::new());
         while !level.is_empty() {
             let names: BTreeSet<&str> = level.iter().filter_map(|value| named.get(value).copied()).collect();
@@ -413,7 +413,7 @@ impl Events for Model {
     }
 
     fn observed_name(&self, value: usize) -> String {
-        self.code.program.observed[self.recorded.chosen[value]].name.clone()
+        self.code.program.observed[self.recorded.chosen[value]].name.to_string()
     }
 
     fn observe(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {

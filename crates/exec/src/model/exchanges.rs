@@ -195,10 +195,9 @@ impl Model {
             return Err(self.undifferentiated_mode(self.run.crossed, std::iter::empty()));
         }
         let code = self.compiled.mode(mode);
-        let names: Vec<&str> =
-            self.recorded.chosen.iter().map(|&i| self.code.program.observed[i].name.as_str()).collect();
+        let names: Vec<&str> = self.recorded.chosen.iter().map(|&i| &*self.code.program.observed[i].name).collect();
         let observed = &code.program.observed;
-        let chosen = names.iter().filter_map(|name| observed.iter().position(|o| o.name == *name && o.value.is_ok()));
+        let chosen = names.iter().filter_map(|name| observed.iter().position(|o| *o.name == **name && o.value.is_ok()));
         let recorded = Arc::new(Recorded::new(&code, chosen.collect()));
         let bounds = self.frame.solvers.iter().map(|s| s.newton.most()).min();
         let mut frame = Frame::new(&code.program, &code.layout, code.layout.size);

@@ -221,8 +221,8 @@ impl Model {
     fn program_of(&self, mode: ModeId, independent: Vec<Symbol>) -> Option<ModeProgram> {
         let code = self.compiled.mode(mode);
         let observed = &self.code.program.observed;
-        let names = self.recorded.chosen.iter().map(|&i| observed[i].name.as_str());
-        let place = |name: &str| code.program.observed.iter().position(|o| o.name == name && o.value.is_ok());
+        let names = self.recorded.chosen.iter().map(|&i| &*observed[i].name);
+        let place = |name: &str| code.program.observed.iter().position(|o| *o.name == *name && o.value.is_ok());
         let recorded = names.map(place).collect::<Option<Vec<usize>>>()?;
         Some(ModeProgram { program: code.program.clone(), recorded, independent })
     }

@@ -51,7 +51,7 @@ impl Model {
     pub fn record(&mut self, names: &[&str]) -> Result<(), RecordError> {
         let observed = &self.code.program.observed;
         let mut index_of: FxHashMap<&str, usize> = FxHashMap::default();
-        observed.iter().enumerate().for_each(|(i, o)| _ = index_of.entry(&o.name).or_insert(i));
+        observed.iter().enumerate().for_each(|(i, o)| _ = index_of.entry(&*o.name).or_insert(i));
         let mut chosen = Vec::with_capacity(names.len());
         for &name in names {
             let index = index_of.get(name).or_else(|| index_of.get(with_letters(name).as_str()));
@@ -65,11 +65,16 @@ impl Model {
         Ok(())
     }
 
+    /// Chooses what is recorded, by indices of what has a value into
+    /// [`Program::observed`](halfarrow_compiler::program::Program).
+    pub fn record_these(&mut self, observed: Vec<usize>) {
+        self.take_recorded(Recorded::new(&self.code, observed));
+    }
+
     /// Everything that has a value, in the order of the program.
     pub fn record_all(&mut self) {
         let available = self.code.program.observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
-        let chosen = available.map(|(i, _)| i).collect();
-        self.take_recorded(Recorded::new(&self.code, chosen));
+        self.record_these(available.map(|(i, _)| i).collect());
     }
 
     /// Records what tells the impulses of resets too, behind everything else.

@@ -567,7 +567,7 @@ impl Model {
     fn start_value(&mut self, t: f64, condition: usize, z: &[f64], residual: f64) -> StartValue {
         let start = self.code.program.start[condition].clone();
         let observed =
-            self.code.program.observed.iter().find(|o| o.name == start.name).and_then(|o| o.value.clone().ok());
+            self.code.program.observed.iter().find(|o| *o.name == *start.name).and_then(|o| o.value.clone().ok());
         let mut wanted = vec![start.asked];
         wanted.extend(observed);
         let routine = self.start_routine(&wanted);

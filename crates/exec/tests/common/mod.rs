@@ -97,9 +97,9 @@ impl Sketch {
             kind: Kind::Zero,
             ports,
             span: Span::default(),
-            label,
+            label: label.into(),
             cell: None,
-            component: String::new(),
+            component: "".into(),
             strand: None,
         })
     }

@@ -243,7 +243,7 @@ fn check_counts(built: &Built, count: &Count, seen: &mut Seen) -> Result<(), Fau
 /// Bond variables have a value exactly where the raw equations determine them.
 fn check_available(graph: &Graph, model: &Model, count: &Count, seen: &mut Seen) -> Result<(), Fault> {
     let observed: BTreeMap<&str, Option<&Unavailable>> =
-        model.program().observed.iter().map(|o| (o.name.as_str(), o.value.as_ref().err())).collect();
+        model.program().observed.iter().map(|o| (&*o.name, o.value.as_ref().err())).collect();
     for b in 0..graph.bonds.len() {
         for (name, expected) in [(format!("b{b}.e"), count.determined[b].0), (format!("b{b}.f"), count.determined[b].1)]
         {
@@ -262,7 +262,7 @@ fn check_available(graph: &Graph, model: &Model, count: &Count, seen: &mut Seen)
         Err(Unavailable::Unsolvable) => Some(o.name.clone()),
         _ => None,
     });
-    wrong.map_or(Ok(()), |name| fault("no value", name))
+    wrong.map_or(Ok(()), |name| fault("no value", &*name))
 }
 
 /// A random time and state near a start that the model accepts; `None` if there is none.

@@ -98,5 +98,5 @@ fn compare(
 }
 
 fn observed(program: &Program) -> Vec<String> {
-    program.observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.clone()).collect()
+    program.observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.to_string()).collect()
 }

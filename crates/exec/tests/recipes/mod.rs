@@ -3,7 +3,7 @@
 
 use super::common::Sketch;
 use halfarrow_compiler::algebra::{Expr, Function};
-use halfarrow_compiler::equations::EquationStep;
+use halfarrow_compiler::equations::{LinearBlock, NewtonBlock};
 use halfarrow_compiler::sparse::SparseMatrix;
 use proptest::prelude::*;
 
@@ -55,7 +55,7 @@ pub fn build(recipe: &Recipe) -> (Sketch, Vec<Expr>) {
                 let (v, _) = s.symbol(&format!("v{number}"));
                 let (three, one) = (s.number(3.0), s.number(1.0));
                 let matrix = SparseMatrix::full(vec![vec![three, bounded], vec![one, three]]);
-                s.step(EquationStep::Linear { unknowns: vec![u, v], matrix, right: vec![b, a], elements: vec![] });
+                s.step(LinearBlock { unknowns: vec![u, v], matrix, right: vec![b, a], elements: vec![] }.into());
                 e
             }
             _ => {
@@ -65,12 +65,9 @@ pub fn build(recipe: &Recipe) -> (Sketch, Vec<Expr>) {
                 let slope = s.x.add(&[three, bounded]);
                 let terms = [s.x.mul(&[slope, e]), cube, s.x.neg(b)];
                 let residual = s.x.add(&terms);
-                s.step(EquationStep::Newton {
-                    unknowns: vec![y],
-                    body: vec![],
-                    residuals: vec![residual],
-                    elements: vec![],
-                });
+                s.step(
+                    NewtonBlock { unknowns: vec![y], body: vec![], residuals: vec![residual], elements: vec![] }.into(),
+                );
                 e
             }
         };

@@ -17,7 +17,7 @@ pub struct Part {
 
 /// What the numbers of all parts are.
 pub struct Recorded {
-    pub names: Vec<String>,
+    pub names: Vec<Arc<str>>,
     pub parameters: BTreeMap<String, f64>,
 }
 
@@ -82,8 +82,9 @@ impl Auditing {
 /// Looks at a part.
 pub fn look(auditor: &mut Auditor, recorded: &Recorded, part: &Part) {
     let columns = turned(&part.samples, recorded.names.len());
-    let columns = recorded.names.iter().cloned().zip(columns.chunks(part.times.len())).collect();
-    auditor.take(&Run { times: &part.times, columns: &columns, parameters: &recorded.parameters });
+    let columns: Vec<&[f64]> = columns.chunks(part.times.len()).collect();
+    let Recorded { names, parameters } = recorded;
+    auditor.take(&Run { times: &part.times, names, columns: &columns, parameters });
 }
 
 /// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.

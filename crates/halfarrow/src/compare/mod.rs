@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
 use halfarrow_compiler::bond_graph::ParameterKind;
-use halfarrow_compiler::equations::{EquationStep, Form, ObservedKind};
+use halfarrow_compiler::equations::{EquationStep, Form, NewtonBlock, ObservedKind};
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
@@ -314,8 +314,9 @@ impl Model {
         let reads = |e: Expr| x.symbols_of(e).contains(&spring.symbol);
         Ok(equations.steps.iter().any(|step| match step {
             EquationStep::Assign { value, .. } => reads(*value),
-            EquationStep::Linear { matrix, right, .. } => matrix.entries().iter().chain(right).any(|&e| reads(e)),
-            EquationStep::Newton { body, residuals, .. } => {
+            EquationStep::Linear(block) => block.matrix.entries().iter().chain(&block.right).any(|&e| reads(e)),
+            EquationStep::Newton(block) => {
+                let NewtonBlock { body, residuals, .. } = &**block;
                 body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
             }
             EquationStep::Guard { .. } => false,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Duration;
 
 use halfarrow_compiler::bond_graph::BondGraph;
@@ -167,7 +168,7 @@ impl Subject<'_> {
         };
         let known = program.observed.iter().filter(|o| o.value.is_ok() && o.kind != ObservedKind::Drift);
         let unit = |o: &Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
-        known.map(|o| Variable { name: o.name.clone(), unit: unit(o), kind: o.kind }).collect()
+        known.map(|o| Variable { name: o.name.to_string(), unit: unit(o), kind: o.kind }).collect()
     }
 
     /// Names of the states.
@@ -255,8 +256,10 @@ impl Subject<'_> {
         };
         let known = self.graph.parameters.values();
         let parameters = known.filter_map(|p| Some((p.name.clone(), parameter(&p.name)?))).collect();
-        let columns = trace.columns.iter().map(|c| (c.name.clone(), c.values.as_slice())).collect();
-        let run = halfarrow_audit::Run { times: &trace.times, columns: &columns, parameters: &parameters };
+        let names: Vec<Arc<str>> = trace.columns.iter().map(|c| c.name.as_str().into()).collect();
+        let columns: Vec<&[f64]> = trace.columns.iter().map(|c| c.values.as_slice()).collect();
+        let (times, parameters) = (&trace.times, &parameters);
+        let run = halfarrow_audit::Run { times, names: &names, columns: &columns, parameters };
         halfarrow_audit::magnitudes(self.graph, &run)
     }
 

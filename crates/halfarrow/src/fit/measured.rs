@@ -85,7 +85,7 @@ fn one(fit: &Fit, compiled: &Compiled, path: &std::path::Path) -> Result<Measure
     let program = compiled.minimal().program();
     let (mut values, mut sigma, mut inputs) = (Vec::new(), Vec::new(), Vec::new());
     for (name, of) in &fit.outputs {
-        let unit = program.observed.iter().find(|o| o.name == *name).and_then(|o| o.unit.as_ref());
+        let unit = program.observed.iter().find(|o| *o.name == **name).and_then(|o| o.unit.as_ref());
         values.push(in_unit(column(of)?, of, unit).map_err(fault)?[..count].to_vec());
         let step = |unit: &Unit| unit.from_si_f64(1.0) - unit.from_si_f64(0.0);
         sigma.push(match fit.sigma.iter().find(|s| s.0 == *name).map(|s| &s.1) {

@@ -389,7 +389,7 @@ fn default_outputs(graph: &BondGraph, program: &Program) -> Vec<String> {
 }
 
 fn observed<'p>(program: &'p Program, name: &str) -> Option<&'p Observed> {
-    program.observed.iter().find(|o| o.name == name)
+    program.observed.iter().find(|o| *o.name == *name)
 }
 
 fn unit(unit: &Option<halfarrow_compiler::unit::Unit>) -> Option<String> {

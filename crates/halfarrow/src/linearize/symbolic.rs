@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use halfarrow_compiler::algebra::{
     Expr, Exprs, ONE, PlainNames, SparseRow, Symbol, ZERO, ascii, back_substitute, eliminate, latex, unicode,
 };
-use halfarrow_compiler::equations::{EquationStep, Equations};
+use halfarrow_compiler::equations::{EquationStep, Equations, LinearBlock};
 use serde::Serialize;
 
 use crate::error::Problem;
@@ -74,7 +74,7 @@ pub(super) fn matrices(equations: Equations, inputs: &[String], outputs: &[Strin
     let states: Vec<Symbol> = equations.states.iter().map(|s| s.symbol).collect();
     let of = |name: &String| equations.graph.inputs.values().find(|i| i.name == *name).map(|i| i.symbol);
     let forces: Vec<Symbol> = inputs.iter().filter_map(of).collect();
-    let value = |name: &String| equations.observed.iter().find(|o| o.name == *name)?.value.clone().ok();
+    let value = |name: &String| equations.observed.iter().find(|o| *o.name == **name)?.value.clone().ok();
     let seen: Vec<Expr> = outputs.iter().filter_map(value).collect();
     let rates: Vec<Expr> = equations.states.iter().map(|s| known.get(&s.rate).copied().unwrap_or(ZERO)).collect();
     let seen: Vec<Expr> = seen.into_iter().map(|e| x.substitute(e, &known)).collect();
@@ -110,7 +110,8 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
                 let value = x.substitute(*value, &known);
                 known.insert(*symbol, value);
             }
-            EquationStep::Linear { unknowns, matrix, right, .. } => {
+            EquationStep::Linear(block) => {
+                let LinearBlock { unknowns, matrix, right, .. } = &**block;
                 if unknowns.len() > BLOCK {
                     return None;
                 }
@@ -142,7 +143,7 @@ fn expansions(x: &mut Exprs, equations: &Equations) -> Option<BTreeMap<Symbol, E
                     known.insert(symbol, value);
                 }
             }
-            EquationStep::Newton { .. } => return None,
+            EquationStep::Newton(_) => return None,
             EquationStep::Guard { .. } => {}
         }
     }

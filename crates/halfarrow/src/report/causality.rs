@@ -51,7 +51,7 @@ fn one(causal: &CausalGraph, loops: &LoopsReport, state: &PortState, on_paths: &
     Decided {
         name: graph.port_name(state.port),
         kind: graph.word(state.port.element),
-        law: element.label.clone(),
+        law: element.label.to_string(),
         causality,
         why,
     }

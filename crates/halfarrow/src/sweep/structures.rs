@@ -77,7 +77,7 @@ fn derived(first: &Structure, sweep: &Sweep, plan: &Plan, set: usize) -> Result<
     let mut system = model.system(&model.equations_in(sweep.run.form)?)?;
     connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
     let observed = &first.system.program().observed;
-    let recorded = first.system.recorded().iter().map(|&i| observed[i].name.clone()).collect();
+    let recorded = first.system.recorded().iter().map(|&i| observed[i].name.to_string()).collect();
     choose(&mut system, &Record::Names(recorded))?;
     let options: Options = options(&sweep.run)?;
     let bad = |failure: halfarrow_sim::Failure| crate::error::Problem::BadOption { reason: failure.to_string() };

@@ -3,18 +3,21 @@
 use super::super::exprs::Exprs;
 use super::super::node::{Expr, Node};
 use super::super::rational::Rational;
+use super::super::symbol_sets::FEW;
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 impl Exprs {
     /// How long the expression is written: symbols, numbers, operators and functions, shared parts each time.
     pub fn written_length(&self, e: Expr) -> u64 {
-        let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
-        for part in self.around_wholes(&[e]) {
+        let parts = self.around_wholes(&[e]);
+        let mut lengths: SmallVec<[u64; FEW]> = SmallVec::with_capacity(parts.len());
+        for &part in &parts {
             let mut length: u64 = match self.node(part) {
                 Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 1,
                 Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
                 Node::Whole(_) => {
-                    lengths.insert(part, 2);
+                    lengths.push(2);
                     continue;
                 }
                 Node::Add(terms) => terms.len() as u64,
@@ -26,10 +29,11 @@ impl Exprs {
                 Node::Pow(..) => 1,
                 _ => 2,
             };
-            self.node(part).for_each_child(|c| length = length.saturating_add(lengths[&c]));
-            lengths.insert(part, length);
+            let known = |c: Expr| lengths[parts.binary_search(&c).expect("parts come before wholes")];
+            self.node(part).for_each_child(|c| length = length.saturating_add(known(c)));
+            lengths.push(length);
         }
-        lengths[&e]
+        lengths[lengths.len() - 1]
     }
 
     /// How long the expression is in print: a bar counts once, brackets and fractions within fractions count extra.

@@ -171,6 +171,11 @@ impl ImplicitModel {
         self.form.record(names)
     }
 
+    /// As [`Model::record_these`].
+    pub fn record_these(&mut self, observed: Vec<usize>) {
+        self.form.record_these(observed);
+    }
+
     /// As [`Model::record_all`].
     pub fn record_all(&mut self) {
         self.form.record_all();

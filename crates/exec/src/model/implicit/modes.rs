@@ -52,11 +52,11 @@ impl ImplicitModel {
     /// Refuses a mode in which something that is recorded has no value.
     fn refuse_unrecorded(&self, t: f64, next: &Program) -> Result<(), Failure> {
         let present = &self.form.code.program.observed;
-        let reason = |program: &Program, name: &str| match program.observed.iter().find(|o| o.name == name)?.value {
+        let reason = |program: &Program, name: &str| match program.observed.iter().find(|o| *o.name == *name)?.value {
             Ok(_) => None,
             Err(ref why) => Some(why.clone()),
         };
-        for name in self.form.recorded.chosen.iter().map(|&i| present[i].name.as_str()) {
+        for name in self.form.recorded.chosen.iter().map(|&i| &*present[i].name) {
             // What takes the rate of an input stands for nothing, as in `without_rates_of_inputs`.
             let there = reason(&self.reference.code.program, name);
             let there = there.filter(|why| matches!(why, Unavailable::NeedsRateOf(_)));

@@ -134,9 +134,9 @@ impl StateMap {
 pub(super) fn without_rates_of_inputs(program: &mut Program, reference: &Program) {
     let without = reference.observed.iter().filter(|o| matches!(o.value, Err(Unavailable::NeedsRateOf(_))));
     let without: BTreeMap<&str, &Unavailable> =
-        without.filter_map(|o| Some((o.name.as_str(), o.value.as_ref().err()?))).collect();
+        without.filter_map(|o| Some((&*o.name, o.value.as_ref().err()?))).collect();
     for observed in &mut program.observed {
-        if let Some(&why) = without.get(observed.name.as_str()) {
+        if let Some(&why) = without.get(&*observed.name) {
             observed.value = Err(why.clone());
         }
     }
