@@ -113,7 +113,7 @@ fn compare(name: &str, form: Form, model: &mut ImplicitModel, reference: &mut Mo
 }
 
 fn observed(program: &Program) -> Vec<String> {
-    program.observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.clone()).collect()
+    program.observed.iter().filter(|o| o.value.is_ok()).map(|o| o.name.to_string()).collect()
 }
 
 /// The size of the terms of each equation: entries of the Jacobian times unknowns and rates.

@@ -98,7 +98,7 @@ fn blocks_are_differentiated_by_inputs_time_and_parameters() {
     let mut with = differentiated.program;
     for entry in &differentiated.entries {
         with.observed.push(halfarrow_compiler::program::Observed {
-            name: format!("d{}", entry.column),
+            name: format!("d{}", entry.column).into(),
             value: Ok(entry.value),
             unit: None,
             kind: halfarrow_compiler::equations::ObservedKind::Named,

@@ -163,7 +163,7 @@ fn export_whole(
         independent: &[],
         project,
     })?;
-    let outputs = recorded.iter().map(|&i| program.observed[i].name.clone()).collect();
+    let outputs = recorded.iter().map(|&i| program.observed[i].name.to_string()).collect();
     x.truncate(program.states.len());
     Ok(Exported { model, start: x, at_start: start, written, method, step, outputs, project })
 }
