@@ -3,7 +3,7 @@
 use crate::constraints::Share;
 use crate::scales::{Quantity, Scale, Scales, Settled, Term};
 use crate::terms::Terms;
-use crate::values::{AT_ONCE, Reader, Values};
+use crate::values::{Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw, TwoPortRow};
@@ -476,14 +476,12 @@ impl<'a, 'b> Check<'a, 'b> {
         let (together, alone): (Vec<&Written>, Vec<&Written>) = laws.iter().partition(|law| law.reader.is_at_samples());
         let readers: Vec<&Reader> = together.iter().map(|law| &law.reader).collect();
         let all = values.together(&readers);
-        let (samples, mut room) = (values.times.len(), Vec::new());
+        let samples = values.times.len();
         let mut zeros = vec![Vec::new(); together.len()];
-        for from in (0..samples).step_by(AT_ONCE) {
-            all.read(from..samples.min(from + AT_ONCE), &mut room, |law, sample, v| match together[law].law {
-                Law::Zero { .. } => zeros[law].push(v.to_vec()),
-                _ => self.at(together[law], sample, v),
-            });
-        }
+        all.read(|law, sample, v| match together[law].law {
+            Law::Zero { .. } => zeros[law].push(v.to_vec()),
+            _ => self.at(together[law], sample, v),
+        });
         together.into_iter().zip(zeros).filter(|law| !law.1.is_empty()).for_each(|(law, found)| self.zero(law, &found));
         for law in alone {
             let clear = |sample: &usize| !law.reader.is_unclear(*sample);

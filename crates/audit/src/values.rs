@@ -416,19 +416,31 @@ pub(crate) struct Together<'v, 'a> {
     read: Reads<'a>,
 }
 
-/// Samples that are read at once.
-pub(crate) const AT_ONCE: usize = 8;
-
 impl Together<'_, '_> {
-    /// The values of all readers at up to [`AT_ONCE`] samples: `found(reader, sample, values)`, sample by sample for each reader.
-    pub fn read(
+    /// The values of all readers at all samples: `found(reader, sample, values)`, a few samples at a time, for each reader in turn.
+    pub fn read(&self, mut found: impl FnMut(usize, usize, &[f64])) {
+        // Few samples, as long rows of short runs have, take little memory.
+        match self.values.times.len() {
+            ..8 => self.read_by::<2>(&mut found),
+            _ => self.read_by::<8>(&mut found),
+        }
+    }
+
+    fn read_by<const N: usize>(&self, found: &mut impl FnMut(usize, usize, &[f64])) {
+        let (samples, mut room) = (self.values.times.len(), Vec::new());
+        for from in (0..samples).step_by(N) {
+            self.read_some::<N>(from..samples.min(from + N), &mut room, found);
+        }
+    }
+
+    fn read_some<const N: usize>(
         &self,
         samples: Range<usize>,
-        room: &mut Vec<[f64; AT_ONCE]>,
-        mut found: impl FnMut(usize, usize, &[f64]),
+        room: &mut Vec<[f64; N]>,
+        found: &mut impl FnMut(usize, usize, &[f64]),
     ) {
         let last = samples.end - 1;
-        let at: [usize; AT_ONCE] = std::array::from_fn(|i| last.min(samples.start + i));
+        let at: [usize; N] = std::array::from_fn(|i| last.min(samples.start + i));
         let t = at.map(|sample| self.values.times[sample]);
         let all = self.read.at(&self.read.wanted, room, t, &|_, column| at.map(|sample| column[sample]));
         let mut values = Vec::new();

@@ -17,7 +17,7 @@ pub(crate) use block_batch::BlockBatches;
 #[cfg(feature = "machine")]
 pub(crate) use conditions::table_on;
 pub(crate) use conditions::{HeldConditions, Hold, piece_of};
-pub(crate) use elimination::{FULL_AT_MOST, Lu};
+pub(crate) use elimination::Lu;
 pub(crate) use frame::{Frame, SolveError};
 #[cfg(feature = "machine")]
 pub(crate) use frame::{InnerCode, PIVOT_BELOW};

@@ -48,7 +48,7 @@ pub use sensitivity::{Quantity, Tape, Taped, Varied};
 pub use setup::Setup;
 pub use wide::WideModel;
 
-use crate::bytecode::{FULL_AT_MOST, Frame, Hold, SolveError};
+use crate::bytecode::{Frame, Hold, SolveError};
 use clauses::EventWork;
 use compiled::Mode;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
@@ -412,12 +412,6 @@ impl Model {
             SolveError::Vanished { guard } => {
                 let guard = &self.code.program.pivot_guards[guard as usize];
                 Failure::Vanished { time, what: first_of(&guard.elements), divisor: guard.divisor.clone() }
-            }
-            SolveError::Singular { block: b }
-                if block(b).size() > FULL_AT_MOST && block(b).matrix().factors.is_some() =>
-            {
-                let what = format!("{} ({} of them, eliminated in a fixed order)", what(b), block(b).size());
-                Failure::Singular { time, what }
             }
             SolveError::Singular { block } => Failure::Singular { time, what: what(block) },
             SolveError::NoConvergence { block, iterations, residual } => {

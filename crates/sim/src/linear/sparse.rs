@@ -60,6 +60,11 @@ impl<T: Number> SparseLu<T> {
         &mut self.values
     }
 
+    /// The entries as they were given last, in the order of the pattern.
+    pub fn stored(&self) -> &[T] {
+        &self.values
+    }
+
     /// Factors the matrix. `false` if it is singular, or there is no memory.
     pub fn factor(&mut self) -> bool {
         self.is_pivoted = false;

@@ -1,6 +1,7 @@
 //! Elimination: linear equations of solve blocks, solved without taking memory.
 
 mod batch;
+mod exchanged;
 mod full;
 mod rank;
 mod sparse;
@@ -8,8 +9,6 @@ mod sparse;
 pub(crate) use batch::{BatchFactors, UpperPattern};
 pub(crate) use full::Lu;
 pub(crate) use rank::RankRevealing;
-
-pub(crate) use sparse::FULL_AT_MOST;
 
 use halfarrow_compiler::program::Block;
 use sparse::SparseLu;

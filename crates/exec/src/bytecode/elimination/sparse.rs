@@ -1,8 +1,10 @@
 //! Sparse linear equations in an order that is fixed: row by row, with the pivots on the diagonal of that order and one
-//! refinement. Where a pivot is too small beside what stands below it, the matrix is factored as a full one.
+//! refinement. Where a pivot is too small beside what stands below it, the matrix is factored as a full one, a large one with
+//! exchanges of rows.
 //!
 //! Exported C does the same operations in the same order.
 
+use super::exchanged::Exchanged;
 use super::full::Lu;
 use halfarrow_compiler::sparse::SymbolicFactors;
 use std::sync::Arc;
@@ -12,7 +14,7 @@ use std::sync::Arc;
 /// Software 37, 2010).
 const THRESHOLD: f64 = 1e-3;
 /// Matrices of more rows are not factored as full ones.
-pub(crate) const FULL_AT_MOST: usize = 1_000;
+const FULL_AT_MOST: usize = 200;
 
 /// A sparse square matrix and, beside it, its triangular factors.
 #[derive(Debug, Clone)]
@@ -31,8 +33,12 @@ pub(crate) struct SparseLu {
     rest: Vec<f64>,
     /// The matrix as a full one; memory is taken when it is needed for the first time.
     full: Option<Box<Lu>>,
-    /// Whether the factors are those of the full one.
+    /// The same with exchanges of rows, for a large one.
+    exchanged: Option<Box<Exchanged>>,
+    /// Whether the factors are those of one of these.
     is_full: bool,
+    /// Whether the determinant was above zero when it was known last: exchanges do not tell.
+    positive: bool,
 }
 
 impl SparseLu {
@@ -48,7 +54,9 @@ impl SparseLu {
             work: line.clone(),
             rest: line,
             full: None,
+            exchanged: None,
             is_full: false,
+            positive: true,
             symbolic,
         }
     }
@@ -62,8 +70,15 @@ impl SparseLu {
         let found = (0..symbolic.rows.len()).try_for_each(|place| self.eliminate(&symbolic, place).ok_or(place));
         self.is_full = found.is_err();
         match found {
-            Ok(()) => Ok(()),
-            Err(place) if symbolic.rows.len() > FULL_AT_MOST => Err(symbolic.columns[place] as usize),
+            Ok(()) => {
+                let inverses = self.inverse.iter();
+                self.positive = inverses.fold(!symbolic.odd, |positive, &inverse| positive == (inverse > 0.0));
+                Ok(())
+            }
+            Err(place) if symbolic.rows.len() > FULL_AT_MOST => {
+                let exchanged = self.exchanged.get_or_insert_with(|| Box::new(Exchanged::new(&symbolic)));
+                exchanged.factor(&self.matrix).then_some(()).ok_or(symbolic.columns[place] as usize)
+            }
             Err(_) => self.factor_full(&symbolic),
         }
     }
@@ -115,8 +130,10 @@ impl SparseLu {
 
     /// Replaces `b` by the solution. The matrix must have been factored.
     pub fn solve(&mut self, b: &mut [f64]) {
-        if let (true, Some(lu)) = (self.is_full, &mut self.full) {
-            return lu.solve(b);
+        match (self.is_full, &mut self.full, &mut self.exchanged) {
+            (true, Some(lu), _) => return lu.solve(b),
+            (true, None, Some(lu)) => return lu.solve(b),
+            _ => {}
         }
         let symbolic = Arc::clone(&self.symbolic);
         let mut rest = std::mem::take(&mut self.rest);
@@ -137,8 +154,10 @@ impl SparseLu {
 
     /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
     pub fn solve_transposed(&mut self, b: &mut [f64]) {
-        if let (true, Some(lu)) = (self.is_full, &mut self.full) {
-            return lu.solve_transposed(b);
+        match (self.is_full, &mut self.full, &mut self.exchanged) {
+            (true, Some(lu), _) => return lu.solve_transposed(b),
+            (true, None, Some(lu)) => return lu.solve_transposed(b),
+            _ => {}
         }
         let symbolic = Arc::clone(&self.symbolic);
         let mut rest = std::mem::take(&mut self.rest);
@@ -187,11 +206,11 @@ impl SparseLu {
         }
     }
 
-    /// Whether the determinant of the factored matrix is above zero.
+    /// Whether the determinant of the factored matrix is above zero; with exchanges of rows, whether it was so before.
     pub fn is_positive(&self) -> bool {
         match &self.full {
             Some(lu) if self.is_full => lu.is_positive(),
-            _ => self.inverse.iter().fold(!self.symbolic.odd, |positive, &inverse| positive == (inverse > 0.0)),
+            _ => self.positive,
         }
     }
 }
@@ -279,6 +298,34 @@ mod tests {
         }
         assert_eq!(lu.factor([2.0, 1.0, 1.0, 2.0].into_iter()), Ok(()));
         assert!(!lu.is_full && lu.is_positive());
+    }
+
+    /// Rows of a large matrix are exchanged where a pivot of the order vanishes.
+    #[test]
+    fn rows_of_large_matrices_are_exchanged() {
+        let n = 400;
+        let pattern = Pattern::new((0..n).map(|i| vec![i / 2 * 2, i / 2 * 2 + 1]).collect::<Vec<_>>());
+        let symbolic = Arc::new(SymbolicFactors::new(&pattern).expect("regular"));
+        let mut lu = SparseLu::new(symbolic);
+        let entries =
+            |small: f64| pattern.places().map(move |(i, j)| if i == j { small } else { 1.0 + (i / 2) as f64 });
+        assert_eq!(lu.factor(entries(0.0)), Ok(()));
+        assert!(lu.is_full && lu.full.is_none());
+        let right: Vec<f64> = (0..n).map(|i| i as f64 - 7.0).collect();
+        for mut other in [lu.clone(), lu] {
+            let (mut x, mut turned) = (right.clone(), right.clone());
+            other.solve(&mut x);
+            other.solve_transposed(&mut turned);
+            for i in 0..n {
+                let expected = right[i ^ 1] / (1.0 + (i / 2) as f64);
+                assert!((x[i] - expected).abs() <= 1e-14 * expected.abs(), "{i}: {} {expected}", x[i]);
+                assert!((turned[i] - expected).abs() <= 1e-14 * expected.abs(), "{i}: {} {expected}", turned[i]);
+            }
+            assert_eq!(other.factor(entries(0.5)), Ok(()));
+            assert!(!other.is_full);
+            // Its first rows are equal.
+            assert!(other.factor(entries(1.0)).is_err());
+        }
     }
 
     #[test]
