@@ -484,11 +484,10 @@ impl<'a, 'b> Check<'a, 'b> {
         });
         together.into_iter().zip(zeros).filter(|law| !law.1.is_empty()).for_each(|(law, found)| self.zero(law, &found));
         for law in alone {
-            let clear = |sample: &usize| !law.reader.is_unclear(*sample);
             let found = (0..samples).map(|sample| law.reader.values(sample, &[]).unwrap_or_default());
             match law.law {
                 Law::Zero { .. } => self.zero(law, &found.collect::<Vec<_>>()),
-                _ => (0..samples).zip(found).filter(|(k, _)| clear(k)).for_each(|(k, v)| self.at(law, k, &v)),
+                _ => (0..samples).zip(found).for_each(|(k, v)| self.at(law, k, &v)),
             }
         }
     }

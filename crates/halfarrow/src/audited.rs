@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use beside::{Auditing as Auditor, Part, Recorded, look};
+use beside::{Part, PlacedAuditor, Recorded, look};
 use halfarrow_audit::{self as audit, Audit, Finding};
 use halfarrow_compiler::bond_graph::{BondGraph, Kind};
 use halfarrow_compiler::program::Observed;
@@ -79,7 +79,7 @@ pub struct Audited<'a, M> {
 /// What is recorded.
 struct Book {
     /// Taken out where it is handed on.
-    auditor: Option<Auditor>,
+    auditor: Option<PlacedAuditor>,
     /// What the method was allowed to neglect of each state, as far as it said so.
     neglected: Vec<f64>,
     recorded: Arc<Recorded>,
@@ -115,7 +115,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             shown: (names.len()..count).collect(),
             samples: Vec::new(),
             times: Vec::new(),
-            auditor: Some(Auditor::Here(Box::new(auditor))),
+            auditor: Some(PlacedAuditor::Here(Box::new(auditor))),
             neglected: Vec::new(),
             origins,
             infinite: BTreeMap::new(),

@@ -22,23 +22,23 @@ pub struct Recorded {
 }
 
 /// An auditor, here or in a thread of its own; the parts come to it in order, so that what it finds does not depend on where.
-pub enum Auditing {
+pub enum PlacedAuditor {
     Here(Box<Auditor>),
     Beside(SyncSender<Part>, JoinHandle<Option<Box<Auditor>>>),
 }
 
-impl Auditing {
+impl PlacedAuditor {
     /// Looks at a part that another one follows; at most one waits.
-    pub fn take(self, recorded: &Arc<Recorded>, part: Part) -> Auditing {
+    pub fn take(self, recorded: &Arc<Recorded>, part: Part) -> PlacedAuditor {
         match self.moved(recorded) {
-            Auditing::Here(mut auditor) => {
+            PlacedAuditor::Here(mut auditor) => {
                 look(&mut auditor, recorded, &part);
-                Auditing::Here(auditor)
+                PlacedAuditor::Here(auditor)
             }
-            Auditing::Beside(sender, thread) => {
+            PlacedAuditor::Beside(sender, thread) => {
                 // A thread that is gone has panicked: that is told where the auditor is asked for.
                 let _ = sender.send(part);
-                Auditing::Beside(sender, thread)
+                PlacedAuditor::Beside(sender, thread)
             }
         }
     }
@@ -46,8 +46,8 @@ impl Auditing {
     /// The auditor, when it has looked at all parts.
     pub fn into_auditor(self) -> Box<Auditor> {
         match self {
-            Auditing::Here(auditor) => auditor,
-            Auditing::Beside(sender, thread) => {
+            PlacedAuditor::Here(auditor) => auditor,
+            PlacedAuditor::Beside(sender, thread) => {
                 drop(sender);
                 let auditor = thread.join().unwrap_or_else(|panic| resume_unwind(panic));
                 auditor.expect("the auditor is handed over before the first part")
@@ -56,10 +56,10 @@ impl Auditing {
     }
 
     /// The same in a thread of its own, where there are threads and this is none of several that have work of their own.
-    fn moved(self, recorded: &Arc<Recorded>) -> Auditing {
-        let Auditing::Here(auditor) = self else { return self };
+    fn moved(self, recorded: &Arc<Recorded>) -> PlacedAuditor {
+        let PlacedAuditor::Here(auditor) = self else { return self };
         if cfg!(target_family = "wasm") || rayon::current_thread_index().is_some() {
-            return Auditing::Here(auditor);
+            return PlacedAuditor::Here(auditor);
         }
         let (hand, handed) = sync_channel::<Box<Auditor>>(1);
         let (sender, parts) = sync_channel::<Part>(1);
@@ -71,10 +71,10 @@ impl Auditing {
         };
         match Builder::new().name("audit".to_string()).spawn(audit) {
             Ok(thread) => match hand.send(auditor) {
-                Ok(()) => Auditing::Beside(sender, thread),
-                Err(back) => Auditing::Here(back.0),
+                Ok(()) => PlacedAuditor::Beside(sender, thread),
+                Err(back) => PlacedAuditor::Here(back.0),
             },
-            Err(_) => Auditing::Here(auditor),
+            Err(_) => PlacedAuditor::Here(auditor),
         }
     }
 }
