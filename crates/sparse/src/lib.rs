@@ -1,6 +1,7 @@
 //! Square matrices of which only the entries that may differ from 0 are kept, and the order in which they are eliminated.
 #![forbid(unsafe_code)]
 
+mod height;
 mod matching;
 mod symbolic;
 

@@ -2,9 +2,10 @@
 //!
 //! Rows are matched to columns so that no pivot is missing, and the pairs put into an order of approximate minimum degree
 //! (Amestoy, Davis and Duff, SIAM Journal on Matrix Analysis and Applications 17, 1996). The order is fixed before any
-//! value is known; whoever computes the factors has to see to it that pivots are good.
+//! value is known; whoever computes the factors has to see to it that pivots are good. Long chains are eliminated from both
+//! ends, see [`height`].
 
-use super::{Matching, Pattern};
+use super::{Matching, Pattern, height};
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
@@ -41,7 +42,8 @@ impl SymbolicFactors {
             return None;
         }
         let full = full_operations(pattern.size());
-        SymbolicFactors::within(pattern, full / GAIN).filter(|factors| GAIN * factors.operations() < full)
+        let factors = SymbolicFactors::within(pattern, full / GAIN)?;
+        (GAIN * factors.operations() < full).then(|| factors.lowered(pattern))
     }
 
     /// The factors of a matrix with this pattern; `None` if it is singular whatever its entries are.
@@ -53,6 +55,24 @@ impl SymbolicFactors {
     fn within(pattern: &Pattern, most: u64) -> Option<SymbolicFactors> {
         let row_of = matched(pattern)?;
         let order = minimum_degree(pattern, &row_of);
+        SymbolicFactors::ordered(pattern, (&row_of, &order), most)
+    }
+
+    /// The factors in an order of the same fill in which fewer steps wait for each other, if long chains of them do.
+    fn lowered(self, pattern: &Pattern) -> SymbolicFactors {
+        if 2 * self.height() < self.rows.len() {
+            return self;
+        }
+        let mut row_of = vec![0; self.rows.len()];
+        self.rows.iter().zip(&self.columns).for_each(|(&row, &column)| row_of[column as usize] = row as usize);
+        let steps = height::lower(&filled(pattern, &row_of, &self));
+        let order = steps.map(|steps| steps.into_iter().map(|place| self.columns[place] as usize).collect::<Vec<_>>());
+        let other = order.and_then(|order| SymbolicFactors::ordered(pattern, (&row_of, &order), u64::MAX));
+        other.filter(|other| other.operations() <= self.operations()).unwrap_or(self)
+    }
+
+    /// The same in this order of columns, each with its row.
+    fn ordered(pattern: &Pattern, (row_of, order): (&[usize], &[usize]), most: u64) -> Option<SymbolicFactors> {
         let mut place_of = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &column)| place_of[column] = place);
         let (mut lower, mut upper, mut matrix) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
@@ -76,13 +96,35 @@ impl SymbolicFactors {
         let rows = order.iter().map(|&column| row_of[column] as u32).collect();
         Some(SymbolicFactors {
             rows,
-            columns: order.into_iter().map(|column| column as u32).collect(),
-            odd: is_odd(&row_of),
+            columns: order.iter().map(|&column| column as u32).collect(),
+            odd: is_odd(row_of),
             lower: Pattern::new(lower),
             upper: Pattern::new(upper),
             matrix: Pattern::new(matrix),
             positions,
         })
+    }
+
+    /// The most steps of elimination that wait for each other.
+    fn height(&self) -> usize {
+        let mut height = vec![1; self.rows.len()];
+        for place in 0..self.rows.len() {
+            if let Some(&next) = self.upper.columns_of(place).first() {
+                height[next as usize] = height[next as usize].max(height[place] + 1);
+            }
+        }
+        height.into_iter().max().unwrap_or(0)
+    }
+
+    /// For each entry of `L` the one of `U` that mirrors it: of a symmetric pattern with a full diagonal, whose rows and
+    /// columns have one order.
+    pub fn mirror(&self) -> Option<Vec<u32>> {
+        if self.rows != self.columns || self.lower.len() != self.upper.len() {
+            return None;
+        }
+        let whole = (0..self.rows.len()).all(|place| self.matrix.entry(place, place).is_some());
+        let mirrored = self.lower.places().map(|(row, column)| self.upper.entry(column, row).map(|e| e as u32));
+        if whole { mirrored.collect() } else { None }
     }
 
     /// Additions and products to factor the matrix, to solve with the factors and to refine the solution once.
@@ -121,6 +163,30 @@ fn minimum_degree(pattern: &Pattern, row_of: &[usize]) -> Vec<usize> {
     let found = amd::order(row_of.len() as isize, &starts, &columns, &amd::Control::default());
     let (order, _, _) = found.expect("the pattern of a matrix");
     order.into_iter().map(|column| column as usize).collect()
+}
+
+/// Where a symmetric matrix that has these entries and their mirror images would be filled: for each place those behind it.
+fn filled(pattern: &Pattern, row_of: &[usize], factors: &SymbolicFactors) -> Vec<Vec<usize>> {
+    let n = row_of.len();
+    let mut place_of = vec![0; n];
+    factors.columns.iter().enumerate().for_each(|(place, &column)| place_of[column as usize] = place);
+    let mut before: Vec<Vec<usize>> = vec![Vec::new(); n];
+    let mut behind: Vec<Vec<usize>> = vec![Vec::new(); n];
+    for (place, &column) in factors.columns.iter().enumerate() {
+        for &other in pattern.columns_of(row_of[column as usize]) {
+            let other = place_of[other as usize];
+            let (first, last) = (place.min(other), place.max(other));
+            before[last].push(first);
+            behind[first].push(last);
+        }
+    }
+    let mut upper: Vec<Vec<usize>> = Vec::with_capacity(n);
+    let mut fill = Fill::new(n);
+    for place in 0..n {
+        let own = before[place].iter().chain(&behind[place]).copied();
+        upper.push(fill.row(own, place, &upper).1);
+    }
+    upper
 }
 
 /// What elimination makes of the columns of rows.
@@ -199,6 +265,14 @@ mod tests {
         let factors = SymbolicFactors::of_large(&chain).expect("it is large");
         assert_eq!((factors.lower.len(), factors.upper.len()), (n - 1, n - 1));
         assert!(!factors.odd);
+    }
+
+    #[test]
+    fn a_chain_is_eliminated_from_both_ends() {
+        let n = 100;
+        let chain = Pattern::new((0..n).map(|i: usize| i.saturating_sub(1)..n.min(i + 2)));
+        let factors = SymbolicFactors::of_large(&chain).expect("it is large");
+        assert!(factors.height() <= n / 2 + 2);
     }
 
     #[test]

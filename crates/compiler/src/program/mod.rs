@@ -28,6 +28,7 @@ mod idle;
 mod jacobian;
 mod kept;
 mod lower;
+mod nearness;
 mod operations;
 mod print;
 mod ratios;

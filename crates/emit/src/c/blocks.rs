@@ -1,7 +1,7 @@
 //! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton/`.
 
-use halfarrow_compiler::program::elimination::Definite;
-use halfarrow_compiler::program::{Block, Program, Reads, Solve};
+use halfarrow_compiler::program::elimination::{Definite, is_written_out};
+use halfarrow_compiler::program::{Block, Method, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
 
 use super::derivatives::Expressions;
@@ -9,9 +9,6 @@ use super::patterns::FULL_AT_MOST;
 use super::write::{Body, Reading, Writer};
 use super::written::{Series, Variable, Written, needed, written};
 use crate::Real;
-
-/// Symmetric linear equations of up to this many unknowns are written out.
-const WRITTEN_OUT: usize = 6;
 
 /// Numbers that `lu.c` takes for a matrix: twice the full matrix, scales of rows, work, what is left, and in single
 /// precision the magnitudes of columns. For a sparse one its entries and factors, weights, inverse pivots and a row, and
@@ -69,8 +66,7 @@ impl Writer<'_> {
         if n == 1 {
             return self.quotient(f, solve, reads, moves);
         }
-        let symmetric = self.program.blocks[solve.block].is_symmetric();
-        if symmetric && n <= WRITTEN_OUT && !moves && !self.factored.places.contains_key(&solve.block.0) {
+        if !moves && self.is_written_out(solve) {
             self.definite(f, solve, a, number);
             return self.solved(f, solve, number);
         }
@@ -102,6 +98,15 @@ impl Writer<'_> {
             );
         }
         self.solved(f, solve, number);
+    }
+
+    /// Whether equations are written out where nothing moves: symmetric ones that are not too many.
+    pub fn is_written_out(&self, solve: &Solve) -> bool {
+        let block = &self.program.blocks[solve.block];
+        let varies = !self.factored.places.contains_key(&solve.block.0);
+        let linear = matches!(solve.method, Method::Linear { .. });
+        let whole = block.matrix().factors.is_none() && solve.unknowns.len() > 1;
+        linear && varies && whole && block.is_symmetric() && is_written_out(&solve.pattern)
     }
 
     /// One equation.
@@ -190,10 +195,8 @@ impl Writer<'_> {
         f.line(Written::of("    {"), 0);
         let mut k = Expressions::new(&mut f.lines, Series::Elimination, self.real);
         k.indent = "        ";
-        let zero = k.push(Written::of(self.real.number(0.0)));
-        let mut full = vec![zero; n * n];
-        solve.pattern.places().zip(entries).for_each(|((i, j), entry)| full[i * n + j] = k.push(entry.clone()));
-        let factors = Definite::factor(&mut k, &full, n, self.real.epsilon() * n as f64);
+        let matrix: Vec<_> = entries.iter().map(|entry| k.push(entry.clone())).collect();
+        let factors = Definite::factor(&mut k, (&solve.pattern, &matrix), self.real.epsilon() * n as f64);
         let asked = std::mem::take(&mut k.asked);
         let asked = asked.into_iter().reduce(|all, one| written!("{} && {}", all, one)).expect("a pivot");
         k.line(&written!("if ({}) {{", asked), 0);

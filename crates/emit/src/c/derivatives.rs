@@ -6,6 +6,8 @@ use halfarrow_compiler::program::calculus::{Calculus, Moving};
 use halfarrow_compiler::program::elimination::Elimination;
 use halfarrow_compiler::program::{ConditionId, Op};
 
+use rustc_hash::FxHashSet;
+
 use super::written::{Binds, Line, Needed, Series, Variable, Written, written};
 use crate::Real;
 
@@ -20,6 +22,8 @@ pub(super) struct Expressions<'t> {
     /// How far lines are indented, and how many temporaries there are.
     pub indent: &'static str,
     kept: u32,
+    /// Temporaries that change.
+    open: FxHashSet<Expression>,
     /// What has to hold for the rest to count.
     pub asked: Vec<Written>,
 }
@@ -29,7 +33,8 @@ pub(super) type Expression = usize;
 
 impl<'t> Expressions<'t> {
     pub fn new(lines: &'t mut Vec<Line>, series: Series, real: Real) -> Self {
-        Expressions { all: Vec::new(), lines, series, real, indent: "    ", kept: 0, asked: Vec::new() }
+        let (all, open, asked) = (Vec::new(), FxHashSet::default(), Vec::new());
+        Expressions { all, lines, series, real, indent: "    ", kept: 0, open, asked }
     }
 
     /// An expression from elsewhere.
@@ -47,7 +52,13 @@ impl<'t> Expressions<'t> {
         self.lines.push(Line::new(written!("{}{}", self.indent, written), numbers));
     }
 
-    /// Declares a temporary.
+    /// The next temporary.
+    fn temporary(&mut self) -> Variable {
+        self.kept += 1;
+        Variable::Part(self.series, "", self.kept - 1)
+    }
+
+    /// Declares a temporary that stays as it is.
     fn declare(&mut self, variable: Variable, value: &Written) -> Written {
         let line = written!("{}const {} {} = {};", self.indent, self.real.kind(), variable, value);
         self.lines.push(Line::constant(variable, line, 1));
@@ -215,9 +226,25 @@ impl Elimination for Expressions<'_> {
         self.asked.push(asked);
     }
     fn keep(&mut self, a: Expression) -> Expression {
-        let variable = Variable::Part(self.series, "", self.kept);
-        self.kept += 1;
+        let variable = self.temporary();
         let kept = self.declare(variable, &self.written(a));
         self.push(kept)
+    }
+    fn open(&mut self, a: Expression) -> Expression {
+        let variable = self.temporary();
+        let line = written!("{} {} = {};", self.real.kind(), variable, self.written(a));
+        self.line(&line, 1);
+        let open = self.push(written!("{}", variable));
+        self.open.insert(open);
+        open
+    }
+    fn take_off(&mut self, a: Expression, product: Expression) -> Expression {
+        if !self.open.contains(&a) {
+            let left = self.sub(a, product);
+            return self.open(left);
+        }
+        let line = written!("{} -= {};", self.written(a), self.written(product));
+        self.line(&line, 0);
+        a
     }
 }

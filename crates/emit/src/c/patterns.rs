@@ -21,7 +21,7 @@ impl Patterns {
         let mut patterns = Patterns::default();
         for block in program.blocks.values() {
             let matrix = block.matrix();
-            if !patterns.different.iter().any(|other| other.values.pattern() == matrix.values.pattern()) {
+            if !patterns.different.iter().any(|other| is_alike(other, matrix)) {
                 patterns.different.push(Matrix::clone(matrix));
             }
         }
@@ -30,9 +30,9 @@ impl Patterns {
 
     /// A pointer to the pattern of a block, and the number of its entries.
     pub fn of_block(&self, program: &Program, block: BlockId) -> (Written, usize) {
-        let pattern = program.blocks[block].matrix().values.pattern();
-        let number = self.different.iter().position(|m| m.values.pattern() == pattern).expect("all blocks are known");
-        (written!("&{}[{}]", needed("ha_patterns"), number), pattern.len())
+        let matrix = program.blocks[block].matrix();
+        let number = self.different.iter().position(|other| is_alike(other, matrix)).expect("all blocks are known");
+        (written!("&{}[{}]", needed("ha_patterns"), number), matrix.values.pattern().len())
     }
 
     /// Whether one of them has an order of its own.
@@ -48,7 +48,8 @@ impl Patterns {
             let pattern = matrix.values.pattern();
             text += &table(&format!("ha_starts_{i}"), pattern.starts());
             text += &table(&format!("ha_columns_{i}"), pattern.columns());
-            let order = matrix.factors.as_ref().map(|f| order(&mut text, i, f));
+            let symmetric = matrix.factors.is_some() && matrix.values.is_symmetric();
+            let order = matrix.factors.as_ref().map(|f| order(&mut text, i, f, symmetric));
             let order = match (self.any_sparse(), order) {
                 (false, _) => String::new(),
                 (true, None) => ", NULL".to_string(),
@@ -60,8 +61,15 @@ impl Patterns {
     }
 }
 
+/// Whether the same tables do for two matrices: what is symmetric is eliminated otherwise if it is large and sparse.
+fn is_alike(one: &Matrix, other: &Matrix) -> bool {
+    one.values.pattern() == other.values.pattern()
+        && (one.factors.is_none() || one.values.is_symmetric() == other.values.is_symmetric())
+}
+
 /// The tables of an order; gives the name of the last one.
-fn order(text: &mut String, number: usize, factors: &SymbolicFactors) -> String {
+fn order(text: &mut String, number: usize, factors: &SymbolicFactors, symmetric: bool) -> String {
+    let mirror = if symmetric { factors.mirror() } else { None };
     let lists = [
         ("rows", &factors.rows[..]),
         ("places", &factors.columns),
@@ -75,8 +83,14 @@ fn order(text: &mut String, number: usize, factors: &SymbolicFactors) -> String 
     ];
     let names: Vec<String> = lists.iter().map(|(name, _)| format!("ha_{name}_{number}")).collect();
     names.iter().zip(lists).for_each(|(name, (_, values))| *text += &table(name, values));
+    let mirror = mirror.map_or("NULL".to_string(), |mirror| {
+        let name = format!("ha_mirror_{number}");
+        *text += &table(&name, &mirror);
+        name
+    });
     let name = format!("ha_order_{number}");
-    *text += &format!("static const ha_order {name} = {{{}, {}}};\n", u8::from(factors.odd), names.join(", "));
+    let lists = names.join(", ");
+    *text += &format!("static const ha_order {name} = {{{}, {lists}, {mirror}}};\n", u8::from(factors.odd));
     name
 }
 

@@ -562,11 +562,8 @@ impl Chunk<'_, '_> {
             self.single_pivot(pivot);
             right[0] = self.w.div(right[0], pivot);
         } else {
-            let mut matrix = vec![self.zero(); n * n];
-            for ((i, j), &entry) in solve.pattern.places().zip(&solve.matrix) {
-                matrix[i * n + j] = self.value(entry);
-            }
-            let factors = Definite::factor(self, &matrix, n, f64::EPSILON * n as f64);
+            let entries: Vec<Value> = solve.matrix.iter().map(|&entry| self.value(entry)).collect();
+            let factors = Definite::factor(self, (&solve.pattern, &entries), f64::EPSILON * n as f64);
             factors.solve(self, &mut right);
         }
         for (&out, value) in solve.unknowns.iter().zip(right) {

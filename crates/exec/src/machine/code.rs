@@ -4,9 +4,9 @@ use super::chunk::{ChunkContext, ChunkItem, is_written_out};
 use super::functions::{Ends, Functions, Plan};
 use super::live::Live;
 use super::memory::{ArrayLengths, Operands};
-use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD, WRITTEN_OUT};
+use super::{CHUNK, Generator, INLINE, MachineError, RARE, STATUS_OF_GUARD};
 use crate::bytecode::{Frame, Hold, InnerCode, Instruction, Layout, Operation, Routine, Solve, SolveError};
-use halfarrow_compiler::program::Program;
+use halfarrow_compiler::program::{Program, elimination};
 use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
@@ -153,7 +153,8 @@ fn cuts(routine: &Routine, written_out: &[bool], inline: bool) -> Vec<Range<usiz
                 (from, size) = (at + 1, 0);
                 continue;
             }
-            weight = routine.solves[solve as usize].matrix.len();
+            let solve = &routine.solves[solve as usize];
+            weight = solve.matrix.len() + elimination::products(&solve.pattern);
         }
         let fails = item(routine, instruction).may_fail(inline);
         if several && fails != failing && from < at {
@@ -176,9 +177,10 @@ fn cuts(routine: &Routine, written_out: &[bool], inline: bool) -> Vec<Range<usiz
 fn written_out(program: &Program, layout: &Layout, routine: &Routine) -> Vec<bool> {
     let used: BTreeSet<_> = routine.solves.iter().filter_map(|solve| solve.shared).collect();
     let is_written_out = |solve: &Solve| {
-        let n = solve.right.len();
+        let block = &program.blocks[solve.block];
         let linear = solve.guess.is_empty() && solve.shared.is_none();
-        let small = n == 1 || n <= WRITTEN_OUT && program.blocks[solve.block].is_symmetric();
+        let whole = block.matrix().factors.is_none() && block.is_symmetric();
+        let small = solve.right.len() == 1 || whole && elimination::is_written_out(&solve.pattern);
         let constant = solve.matrix.iter().all(|&r| r < layout.time);
         linear && small && !constant && !used.contains(&solve.block)
     };

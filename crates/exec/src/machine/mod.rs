@@ -30,8 +30,6 @@ const RARE: u64 = u64::MAX;
 const STATUS_OF_GUARD: u64 = 1;
 /// Instructions in a chunk: beyond some hundreds the time to compile grows faster than the code.
 const CHUNK: usize = 250;
-/// Linear blocks of up to this many unknowns are written out.
-const WRITTEN_OUT: usize = 12;
 /// Calls of functions that are written out in a routine, at most: many take long to compile.
 const INLINE: usize = 48;
 

@@ -250,8 +250,8 @@ impl<'a> Plan<'a> {
 
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
-            let block = block_functions(&mut writer, i, program.blocks[*block].size(), code);
-            self.functions.extend(block);
+            let pattern = program.blocks[*block].matrix().values.pattern();
+            self.functions.extend(block_functions(&mut writer, i, pattern, code));
         }
 
         // Last, once it is known what is read in double precision.

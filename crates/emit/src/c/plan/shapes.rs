@@ -1,6 +1,7 @@
 //! How the functions of a model are called, and those that are more than one routine.
 
 use halfarrow_compiler::program::{Code, Value};
+use halfarrow_compiler::sparse::Pattern;
 
 use crate::Real;
 use crate::c::function::{self, Function, Gives, Parameter};
@@ -73,8 +74,10 @@ pub(super) fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<I
     Function::new(name.into(), Gives::Nothing, &[Parameter::ConstModel, out], writer.real, &lines)
 }
 
-/// The functions of a Newton block.
-pub(super) fn block_functions(writer: &mut Writer, number: usize, n: usize, code: &Code) -> Vec<Function> {
+/// The functions of a Newton block, each residual beside its derivatives.
+pub(super) fn block_functions(writer: &mut Writer, number: usize, pattern: &Pattern, code: &Code) -> Vec<Function> {
+    let n = pattern.size();
+    let code = &code.near((0..n).flat_map(|row| std::iter::once(row).chain(pattern.row(row).map(move |e| n + e))));
     let list = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
     let mut values = list("right", n);
     values.extend(list("matrix", code.outputs.len() - n));

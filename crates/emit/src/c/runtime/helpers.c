@@ -10,13 +10,19 @@ static int ha_fits(double a)
 //item ha_all_finite
 static int ha_all_finite(const $real *a, int n)
 {
-    int i;
-    for (i = 0; i < n; ++i) {
-        if (!$ha_finite(a[i])) {
-            return 0;
+    /* What is finite less itself is 0. */
+    $real rest[4] = {$0.0, $0.0, $0.0, $0.0};
+    int i = 0;
+    int j;
+    for (; i + 4 <= n; i += 4) {
+        for (j = 0; j < 4; ++j) {
+            rest[j] += a[i + j] - a[i + j];
         }
     }
-    return 1;
+    for (; i < n; ++i) {
+        rest[0] += a[i] - a[i];
+    }
+    return rest[0] + rest[1] + rest[2] + rest[3] == $0.0;
 }
 
 //item ha_copy

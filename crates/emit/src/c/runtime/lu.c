@@ -17,6 +17,8 @@ typedef struct {
     const int *starts;
     const int *matrix;
     const int *positions;
+    /* Of a matrix that is symmetric whatever its values: for each entry of lower the one of upper that mirrors it; else NULL. */
+    const int *mirror;
 } ha_order;
 
 //end
@@ -165,6 +167,27 @@ static $real ha_less_products($real start, const $real *a, const $real *b, int n
     return result;
 }
 
+//item ha_less_scaled
+/* a - factor b, four places at a time, for compilers that know vectors. */
+static void ha_less_scaled($real *restrict a, const $real *restrict b, $real factor, int n)
+{
+    int i = 0;
+    int j;
+    for (; i + 4 <= n; i += 4) {
+        $real products[4];
+        for (j = 0; j < 4; ++j) {
+            products[j] = factor * b[i + j];
+        }
+        for (j = 0; j < 4; ++j) {
+            a[i + j] -= products[j];
+        }
+    }
+    for (; i < n; ++i) {
+        const $real product = factor * b[i];
+        a[i] -= product;
+    }
+}
+
 //item ha_lu_factor_definite
 /* Factors a symmetric matrix that is definite: U above the diagonal and its mirror image below, the inverse of D in
  * scale, -1 as the first of the order. 0 if it is not such a matrix. */
@@ -198,12 +221,8 @@ static int ha_lu_factor_definite(ha_lu *l)
         for (j = k + 1; j < n; ++j) {
             const $real factor = row[j] * inverse;
             l->factors[j * n + k] = factor;
-            if (row[j] == $0.0) {
-                continue;
-            }
-            for (i = j; i < n; ++i) {
-                const $real product = factor * row[i];
-                l->factors[j * n + i] -= product;
+            if (row[j] != $0.0) {
+                $ha_less_scaled(l->factors + j * n + j, row + j, factor, n - j);
             }
         }
         for (j = k + 1; j < n; ++j) {
@@ -225,20 +244,14 @@ static void ha_lu_solve_definite(const ha_lu *l, $real *b)
         b[i] += $0.0;
     }
     for (k = 0; k < n; ++k) {
-        for (i = k + 1; i < n; ++i) {
-            const $real product = l->factors[k * n + i] * b[k];
-            b[i] -= product;
-        }
+        $ha_less_scaled(b + k + 1, l->factors + k * n + k + 1, b[k], n - k - 1);
     }
     for (k = 0; k < n; ++k) {
         const $real scaled = b[k] * l->scale[k];
         b[k] = scaled + $0.0;
     }
     for (k = n - 1; k >= 0; --k) {
-        for (i = 0; i < k; ++i) {
-            const $real product = l->factors[k * n + i] * b[k];
-            b[i] -= product;
-        }
+        $ha_less_scaled(b, l->factors + k * n, b[k], k);
     }
 }
 
@@ -366,14 +379,99 @@ static int ha_sparse_row(ha_lu *l, int place)
     return 1;
 }
 
+//item ha_sparse_definite
+/* Factors a sparse symmetric matrix that is definite: what l->upper keeps is D U. 0 if it is not such a matrix. */
+static int ha_sparse_definite(ha_lu *l)
+{
+    const ha_order *o = l->pattern->order;
+    $real sign = $1.0;
+    int place;
+    int i;
+    int j;
+    for (place = 0; place < l->n; ++place) {
+        const int after = o->upper_starts[place];
+        const int end = o->upper_starts[place + 1];
+        $real entry = $0.0;
+        $real pivot;
+        $real size;
+        for (i = after; i < end; ++i) {
+            l->row[o->upper[i]] = $0.0;
+        }
+        for (i = o->starts[place]; i < o->starts[place + 1]; ++i) {
+            const int column = o->matrix[i];
+            if (column == place) {
+                entry = l->entries[i];
+            } else if (column > place) {
+                l->row[column] = l->entries[i];
+            }
+        }
+        if (place == 0) {
+            sign = $copysign($1.0, entry);
+        }
+        pivot = entry;
+        for (i = o->lower_starts[place]; i < o->lower_starts[place + 1]; ++i) {
+            const int k = o->lower[i];
+            const int e = o->mirror[i];
+            const $real factor = l->upper[e] * l->inverse[k];
+            const $real square = factor * l->upper[e];
+            pivot -= square;
+            for (j = e + 1; j < o->upper_starts[k + 1]; ++j) {
+                const $real product = factor * l->upper[j];
+                l->row[o->upper[j]] -= product;
+            }
+        }
+        size = sign * pivot;
+        if (!(size > $0.0 && size > $DBL_EPSILON * ($real)l->n * (sign * entry) && $ha_finite(size))) {
+            return 0;
+        }
+        l->inverse[place] = $1.0 / pivot;
+        for (i = after; i < end; ++i) {
+            l->upper[i] = l->row[o->upper[i]];
+        }
+    }
+    return 1;
+}
+
+//item ha_sparse_solve_definite
+static void ha_sparse_solve_definite(const ha_lu *l, $real *b)
+{
+    const ha_order *o = l->pattern->order;
+    int place;
+    int i;
+    for (place = 0; place < l->n; ++place) {
+        l->work[place] = b[o->rows[place]];
+    }
+    for (place = 0; place < l->n; ++place) {
+        const $real done = l->work[place] * l->inverse[place];
+        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+            const $real product = l->upper[i] * done;
+            l->work[o->upper[i]] -= product;
+        }
+    }
+    for (place = l->n - 1; place >= 0; --place) {
+        $real left = l->work[place];
+        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+            const $real product = l->upper[i] * l->work[o->upper[i]];
+            left -= product;
+        }
+        l->work[place] = left * l->inverse[place];
+        b[o->columns[place]] = l->work[place];
+    }
+}
+
 //item ha_sparse_factor
-/* Factors a sparse matrix; where the pivots of its order do not do, as a full one if it is not too large. */
+/* Factors a sparse matrix, as a definite one if it is symmetric; where the pivots of its order do not do, as a full one if
+ * it is not too large. */
 static int ha_sparse_factor(ha_lu *l)
 {
     const ha_order *o = l->pattern->order;
     const int n = l->n;
     int place;
     int i;
+    if (o->mirror != NULL && $ha_sparse_definite(l)) {
+        l->order[n] = 2;
+        return 1;
+    }
 //if single
     $ha_fill(l->columns, $DBL_MIN, n);
     for (i = 0; i < o->starts[n]; ++i) {
@@ -435,6 +533,10 @@ static void ha_sparse_solve(ha_lu *l, $real *b)
     const int n = l->n;
     int place;
     int i;
+    if (l->order[n] == 2) {
+        $ha_sparse_solve_definite(l, b);
+        return;
+    }
     $ha_copy(l->rest, b, n);
     $ha_sparse_substitute(l, b);
     for (place = 0; place < n; ++place) {
@@ -486,7 +588,7 @@ static void ha_lu_solve(ha_lu *l, $real *b)
     int row;
     int j;
 //if sparse
-    if (l->pattern->order != NULL && !l->order[n]) {
+    if (l->pattern->order != NULL && l->order[n] != 1) {
         $ha_sparse_solve(l, b);
         return;
     }
@@ -525,7 +627,10 @@ static int ha_lu_is_positive(const ha_lu *l)
     int j;
     int k;
 //if sparse
-    if (l->pattern->order != NULL && !l->order[n]) {
+    if (l->pattern->order != NULL && l->order[n] == 2) {
+        return n % 2 == 0 || l->inverse[0] > $0.0;
+    }
+    if (l->pattern->order != NULL && l->order[n] == 0) {
         changes = l->pattern->order->odd;
         for (k = 0; k < n; ++k) {
             changes += l->inverse[k] > $0.0 ? 0 : 1;

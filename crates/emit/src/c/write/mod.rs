@@ -7,6 +7,7 @@ mod steps;
 
 pub(super) use shape::{Body, Moving, Reading, Shape, Time, TimeRate};
 
+use halfarrow_compiler::program::elimination::products;
 use halfarrow_compiler::program::{Arg, BlockId, Code, Local, Op, Program, Step, Value};
 use rustc_hash::FxHashMap;
 
@@ -72,13 +73,14 @@ impl<'a> Writer<'a> {
         (code, kept): (&Code, &[(u32, Value)]),
         places: (&[String], &[String]),
     ) -> Vec<Function> {
-        let chunks: Vec<&[Step]> = if code.steps.is_empty() { vec![&[]] } else { code.steps.chunks(CHUNK).collect() };
+        let chunks = self.chunks(&code.steps);
         let mut f = self.body(shape, (code, kept), &chunks, !places.1.is_empty());
-        let mut functions = Vec::new();
+        let (mut functions, mut place) = (Vec::new(), 0);
         for (c, steps) in chunks.iter().enumerate() {
             f.chunk = c;
             f.turns = turns(steps);
-            steps.iter().enumerate().for_each(|(i, step)| self.step(&mut f, step, c * CHUNK + i));
+            steps.iter().zip(place..).for_each(|(step, at)| self.step(&mut f, step, at));
+            place += steps.len();
             self.outputs(&mut f, code, places, chunks.len());
             let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
             let mut lines = without_the_unread(std::mem::take(&mut f.lines));
@@ -90,6 +92,26 @@ impl<'a> Writer<'a> {
             functions.push(self.finished(name.to_string(), shape, lines));
         }
         functions
+    }
+
+    /// Steps that stand in one function; a block that is written out counts with what that takes.
+    fn chunks<'s>(&self, steps: &'s [Step]) -> Vec<&'s [Step]> {
+        let weight = |step: &Step| match step {
+            Step::Solve(solve) if self.is_written_out(solve) => products(&solve.pattern),
+            _ => 1,
+        };
+        let (mut chunks, mut from, mut size) = (Vec::new(), 0, 0);
+        for (at, step) in steps.iter().enumerate() {
+            size += weight(step);
+            if size >= CHUNK {
+                chunks.push(&steps[from..=at]);
+                (from, size) = (at + 1, 0);
+            }
+        }
+        if from < steps.len() || chunks.is_empty() {
+            chunks.push(&steps[from..]);
+        }
+        chunks
     }
 
     /// A function that is to be written, with a home for each local.

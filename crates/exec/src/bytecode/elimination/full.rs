@@ -271,7 +271,7 @@ fn pivot(n: usize, factors: &[f64], scale: &[f64], k: usize) -> Option<usize> {
 }
 
 /// Whether a pivot of a positive symmetric matrix is above rounding of the diagonal entry that it comes from.
-fn is_definite(pivot: f64, entry: f64, size: usize) -> bool {
+pub(super) fn is_definite(pivot: f64, entry: f64, size: usize) -> bool {
     pivot > 0.0 && pivot > f64::EPSILON * size as f64 * entry && pivot < f64::INFINITY
 }
 

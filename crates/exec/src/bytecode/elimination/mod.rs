@@ -1,6 +1,7 @@
 //! Elimination: linear equations of solve blocks, solved without taking memory.
 
 mod batch;
+mod definite;
 mod exchanged;
 mod full;
 mod rank;
@@ -27,7 +28,7 @@ impl Factors {
     pub fn new(block: &Block) -> Factors {
         let (n, matrix) = (block.size(), block.matrix());
         match &matrix.factors {
-            Some(symbolic) => Factors::Sparse(SparseLu::new(symbolic.clone())),
+            Some(symbolic) => Factors::Sparse(SparseLu::new(symbolic.clone(), block.is_symmetric())),
             None => {
                 let places = matrix.values.pattern().places().map(|(row, column)| (row * n + column) as u32);
                 Factors::Full(Lu::new(n, block.is_symmetric()), places.collect())

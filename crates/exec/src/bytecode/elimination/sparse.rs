@@ -1,9 +1,11 @@
 //! Sparse linear equations in an order that is fixed: row by row, with the pivots on the diagonal of that order and one
 //! refinement. Where a pivot is too small beside what stands below it, the matrix is factored as a full one, a large one with
-//! exchanges of rows.
+//! exchanges of rows. One that is symmetric whatever its values is first taken as definite, see
+//! [`definite`](super::definite).
 //!
 //! Exported C does the same operations in the same order.
 
+use super::definite::SparseDefinite;
 use super::exchanged::Exchanged;
 use super::full::Lu;
 use halfarrow_compiler::sparse::SymbolicFactors;
@@ -35,14 +37,25 @@ pub(crate) struct SparseLu {
     full: Option<Box<Lu>>,
     /// The same with exchanges of rows, for a large one.
     exchanged: Option<Box<Exchanged>>,
-    /// Whether the factors are those of one of these.
-    is_full: bool,
-    /// Whether the determinant was above zero when it was known last: exchanges do not tell.
+    /// Whether the determinant of a large one was above zero when it was known last: exchanges do not tell.
     positive: bool,
+    /// The factors as those of a symmetric matrix.
+    definite: Option<Box<SparseDefinite>>,
+    /// Which factors there are.
+    factored: Factored,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Factored {
+    Definite,
+    Sparse,
+    Full,
+    Exchanged,
 }
 
 impl SparseLu {
-    pub fn new(symbolic: Arc<SymbolicFactors>) -> SparseLu {
+    /// Room for a matrix with these factors; `symmetric`: whatever its values.
+    pub fn new(symbolic: Arc<SymbolicFactors>, symmetric: bool) -> SparseLu {
         let line = vec![0.0; symbolic.rows.len()];
         SparseLu {
             matrix: vec![0.0; symbolic.matrix.len()],
@@ -55,8 +68,9 @@ impl SparseLu {
             rest: line,
             full: None,
             exchanged: None,
-            is_full: false,
             positive: true,
+            definite: symmetric.then(|| SparseDefinite::new(&symbolic)).flatten().map(Box::new),
+            factored: Factored::Sparse,
             symbolic,
         }
     }
@@ -67,20 +81,26 @@ impl SparseLu {
         // The entries come in the order of the matrix; `position` says where each one stands.
         let symbolic = Arc::clone(&self.symbolic);
         entries.zip(&symbolic.positions).for_each(|(entry, &at)| self.matrix[at as usize] = entry);
-        let found = (0..symbolic.rows.len()).try_for_each(|place| self.eliminate(&symbolic, place).ok_or(place));
-        self.is_full = found.is_err();
-        match found {
-            Ok(()) => {
-                let inverses = self.inverse.iter();
-                self.positive = inverses.fold(!symbolic.odd, |positive, &inverse| positive == (inverse > 0.0));
-                Ok(())
-            }
-            Err(place) if symbolic.rows.len() > FULL_AT_MOST => {
-                let exchanged = self.exchanged.get_or_insert_with(|| Box::new(Exchanged::new(&symbolic)));
-                exchanged.factor(&self.matrix).then_some(()).ok_or(symbolic.columns[place] as usize)
-            }
-            Err(_) => self.factor_full(&symbolic),
+        let large = symbolic.rows.len() > FULL_AT_MOST;
+        if large && self.factored != Factored::Exchanged {
+            self.positive = self.is_positive();
         }
+        if self.definite.as_mut().is_some_and(|definite| definite.factor(&symbolic, &self.matrix)) {
+            self.factored = Factored::Definite;
+            return Ok(());
+        }
+        let found = (0..symbolic.rows.len()).try_for_each(|place| self.eliminate(&symbolic, place).ok_or(place));
+        let Err(place) = found else {
+            self.factored = Factored::Sparse;
+            return Ok(());
+        };
+        if !large {
+            self.factored = Factored::Full;
+            return self.factor_full(&symbolic);
+        }
+        self.factored = Factored::Exchanged;
+        let exchanged = self.exchanged.get_or_insert_with(|| Box::new(Exchanged::new(&symbolic)));
+        exchanged.factor(&self.matrix).then_some(()).ok_or(symbolic.columns[place] as usize)
     }
 
     /// Factors the row in a place; `None` if a pivot does not do.
@@ -130,10 +150,11 @@ impl SparseLu {
 
     /// Replaces `b` by the solution. The matrix must have been factored.
     pub fn solve(&mut self, b: &mut [f64]) {
-        match (self.is_full, &mut self.full, &mut self.exchanged) {
-            (true, Some(lu), _) => return lu.solve(b),
-            (true, None, Some(lu)) => return lu.solve(b),
-            _ => {}
+        match self.factored {
+            Factored::Full => return self.full.iter_mut().for_each(|lu| lu.solve(b)),
+            Factored::Exchanged => return self.exchanged.iter_mut().for_each(|lu| lu.solve(b)),
+            Factored::Definite => return self.definite.iter_mut().for_each(|lu| lu.solve(&self.symbolic, b)),
+            Factored::Sparse => {}
         }
         let symbolic = Arc::clone(&self.symbolic);
         let mut rest = std::mem::take(&mut self.rest);
@@ -154,10 +175,11 @@ impl SparseLu {
 
     /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
     pub fn solve_transposed(&mut self, b: &mut [f64]) {
-        match (self.is_full, &mut self.full, &mut self.exchanged) {
-            (true, Some(lu), _) => return lu.solve_transposed(b),
-            (true, None, Some(lu)) => return lu.solve_transposed(b),
-            _ => {}
+        match self.factored {
+            Factored::Full => return self.full.iter_mut().for_each(|lu| lu.solve_transposed(b)),
+            Factored::Exchanged => return self.exchanged.iter_mut().for_each(|lu| lu.solve_transposed(b)),
+            Factored::Definite => return self.definite.iter_mut().for_each(|lu| lu.solve(&self.symbolic, b)),
+            Factored::Sparse => {}
         }
         let symbolic = Arc::clone(&self.symbolic);
         let mut rest = std::mem::take(&mut self.rest);
@@ -208,9 +230,11 @@ impl SparseLu {
 
     /// Whether the determinant of the factored matrix is above zero; with exchanges of rows, whether it was so before.
     pub fn is_positive(&self) -> bool {
-        match &self.full {
-            Some(lu) if self.is_full => lu.is_positive(),
-            _ => self.positive,
+        match (self.factored, &self.full, &self.definite) {
+            (Factored::Full, Some(lu), _) => lu.is_positive(),
+            (Factored::Definite, _, Some(definite)) => definite.is_positive(),
+            (Factored::Exchanged, _, _) => self.positive,
+            _ => self.inverse.iter().fold(!self.symbolic.odd, |positive, &inverse| positive == (inverse > 0.0)),
         }
     }
 }
@@ -259,7 +283,7 @@ mod tests {
             let Some(symbolic) = SymbolicFactors::new(&pattern) else { continue };
             let mut next = numbers(seed + 100.0);
             let b: Vec<f64> = (0..40).map(|_| next()).collect();
-            let (mut lu, mut other) = (SparseLu::new(Arc::new(symbolic)), full(&pattern, &entries));
+            let (mut lu, mut other) = (SparseLu::new(Arc::new(symbolic), false), full(&pattern, &entries));
             let (found, expected) = (lu.factor(entries.iter().copied()), other.factor());
             assert_eq!(found.is_ok(), expected.is_ok(), "{seed}");
             if found.is_err() {
@@ -288,16 +312,16 @@ mod tests {
         // The pivot of the order vanishes; rows have to be exchanged.
         let pattern = Pattern::new([vec![0, 1], vec![0, 1]]);
         let symbolic = Arc::new(SymbolicFactors::new(&pattern).expect("regular"));
-        let mut lu = SparseLu::new(symbolic);
+        let mut lu = SparseLu::new(symbolic, false);
         for small in [0.0, 1e-20, f64::MIN_POSITIVE] {
             assert_eq!(lu.factor([small, 1.0, 1.0, small].into_iter()), Ok(()));
-            assert!(lu.is_full && !lu.is_positive());
+            assert!(lu.factored == Factored::Full && !lu.is_positive());
             let mut b = [2.0, 3.0];
             lu.solve(&mut b);
             assert_eq!(b, [3.0, 2.0]);
         }
         assert_eq!(lu.factor([2.0, 1.0, 1.0, 2.0].into_iter()), Ok(()));
-        assert!(!lu.is_full && lu.is_positive());
+        assert!(lu.factored == Factored::Sparse && lu.is_positive());
     }
 
     /// Rows of a large matrix are exchanged where a pivot of the order vanishes.
@@ -306,11 +330,11 @@ mod tests {
         let n = 400;
         let pattern = Pattern::new((0..n).map(|i| vec![i / 2 * 2, i / 2 * 2 + 1]).collect::<Vec<_>>());
         let symbolic = Arc::new(SymbolicFactors::new(&pattern).expect("regular"));
-        let mut lu = SparseLu::new(symbolic);
+        let mut lu = SparseLu::new(symbolic, false);
         let entries =
             |small: f64| pattern.places().map(move |(i, j)| if i == j { small } else { 1.0 + (i / 2) as f64 });
         assert_eq!(lu.factor(entries(0.0)), Ok(()));
-        assert!(lu.is_full && lu.full.is_none());
+        assert_eq!(lu.factored, Factored::Exchanged);
         let right: Vec<f64> = (0..n).map(|i| i as f64 - 7.0).collect();
         for mut other in [lu.clone(), lu] {
             let (mut x, mut turned) = (right.clone(), right.clone());
@@ -322,7 +346,7 @@ mod tests {
                 assert!((turned[i] - expected).abs() <= 1e-14 * expected.abs(), "{i}: {} {expected}", turned[i]);
             }
             assert_eq!(other.factor(entries(0.5)), Ok(()));
-            assert!(!other.is_full);
+            assert_eq!(other.factored, Factored::Sparse);
             // Its first rows are equal.
             assert!(other.factor(entries(1.0)).is_err());
         }
@@ -331,9 +355,59 @@ mod tests {
     #[test]
     fn what_is_singular_is_said_to_be_so() {
         let pattern = Pattern::new([vec![0, 1], vec![0, 1]]);
-        let mut lu = SparseLu::new(Arc::new(SymbolicFactors::new(&pattern).expect("regular")));
+        let mut lu = SparseLu::new(Arc::new(SymbolicFactors::new(&pattern).expect("regular")), false);
         assert!(lu.factor([1.0, 2.0, 2.0, 4.0].into_iter()).is_err());
         assert!(lu.factor([f64::NAN, 2.0, 2.0, 4.0].into_iter()).is_err());
         assert!(lu.factor([1.0, f64::INFINITY, 2.0, 4.0].into_iter()).is_err());
+    }
+    /// Nodes of a ladder and of a net with sources between them: tridiagonal with a few entries far off, definite if `sign`
+    /// is not 0, up to that; else entries of the diagonal of either sign.
+    fn symmetric(n: usize, sign: f64, seed: f64) -> (Pattern, Vec<f64>) {
+        let mut next = numbers(seed);
+        let mut full = vec![vec![0.0; n]; n];
+        for i in 0..n {
+            for j in [(i + 1) % n, (7 * i + 3) % n].into_iter().filter(|&j| j != i) {
+                let conductance = crate::math::pow(10.0, 8.0 * next());
+                (full[i][i], full[j][j]) = (full[i][i] + conductance, full[j][j] + conductance);
+                (full[i][j], full[j][i]) = (full[i][j] - conductance, full[j][i] - conductance);
+            }
+            full[i][i] += 1e-3;
+        }
+        let of_sign = |i: usize| {
+            if sign < 0.0 || sign == 0.0 && i % 2 == 1 { -1.0 } else { 1.0 }
+        };
+        let entry = |i: usize, j: usize| if i == j { of_sign(i) * full[i][j] } else { of_sign(0) * full[i][j] };
+        let pattern = Pattern::new((0..n).map(|i| (0..n).filter(|&j| full[i][j] != 0.0).collect::<Vec<_>>()));
+        let entries = pattern.places().map(|(i, j)| entry(i, j)).collect();
+        (pattern, entries)
+    }
+
+    #[test]
+    fn symmetric_matrices_take_half_the_work_where_they_are_definite() {
+        for (seed, sign) in (1..30).map(|seed| (f64::from(seed), [1.0, -1.0, 0.0][seed as usize % 3])) {
+            let n = 30 + seed as usize;
+            let (pattern, entries) = symmetric(n, sign, seed);
+            let symbolic = Arc::new(SymbolicFactors::new(&pattern).expect("regular"));
+            let mut next = numbers(seed + 100.0);
+            let b: Vec<f64> = (0..n).map(|_| next()).collect();
+            let (mut lu, mut other) = (SparseLu::new(symbolic, true), full(&pattern, &entries));
+            assert_eq!((lu.factor(entries.iter().copied()), other.factor()), (Ok(()), Ok(())));
+            assert_eq!(lu.factored == Factored::Definite, sign != 0.0, "{seed}");
+            assert_eq!(lu.is_positive(), other.is_positive(), "{seed} {sign}");
+            let (mut x, mut turned, mut y) = (b.clone(), b.clone(), b.clone());
+            lu.solve(&mut x);
+            lu.solve_transposed(&mut turned);
+            other.solve(&mut y);
+            // Backward errors beside what each row is the sum of, and the errors of unknowns beside the greatest.
+            let mut rows: Vec<(f64, f64)> = b.iter().map(|b| (*b, b.abs())).collect();
+            for ((i, j), e) in pattern.places().zip(&entries) {
+                rows[i] = (rows[i].0 - e * x[j], rows[i].1 + (e * x[j]).abs());
+            }
+            assert!(rows.iter().all(|r| r.0.abs() <= 1e-13 * r.1), "{seed} {sign}: {rows:?}");
+            let most = y.iter().fold(0.0f64, |most, y| most.max(y.abs()));
+            let off =
+                x.iter().chain(&turned).zip(y.iter().chain(&y)).fold(0.0f64, |off, (x, y)| off.max((x - y).abs()));
+            assert!(off <= 1e-9 * most, "{seed} {sign}: {off:e} of {most:e}");
+        }
     }
 }
