@@ -7,7 +7,7 @@
 use super::elimination::{BatchFactors, UpperPattern};
 use super::frame::{Frame, Solver};
 use super::instruction::{Register, Routine, Solve};
-use super::newton::{CLOSE_TO_ROUNDING, CONTRACTION, CONVERGED};
+use super::newton::{CLOSE_TO_ROUNDING, CONTRACTION, CONVERGED, LEAST_CORRECTION};
 use super::packed::Packed;
 use super::registers::Layout;
 use super::wide::{self, WideFrame};
@@ -198,6 +198,8 @@ pub(crate) struct BatchWorkspace {
     lanes_in_use: usize,
     x: Vec<Vector>,
     scale: Vec<Vector>,
+    weight: Vec<Vector>,
+    first_weight: Vec<Vector>,
     correction: Vec<Vector>,
     simplified: Vec<Vector>,
     first_correction: Vec<Vector>,
@@ -221,6 +223,8 @@ impl BatchWorkspace {
         for vector in [
             &mut self.x,
             &mut self.scale,
+            &mut self.weight,
+            &mut self.first_weight,
             &mut self.correction,
             &mut self.simplified,
             &mut self.first_correction,
@@ -342,12 +346,12 @@ fn greater(a: &Vector, b: &Vector) -> Vector {
     each(|l| if b[l] > a[l] { b[l] } else { a[l] })
 }
 
-/// What a correction is scaled by: the magnitude of its unknown, its own, or the least number.
+/// The inverse of what a correction is scaled by: the magnitude of its unknown, its own, or the least number.
 #[inline(always)]
-fn scale(size: &Vector, step: &Vector) -> Vector {
+fn weight(size: &Vector, step: &Vector) -> Vector {
     each(|l| {
         let most = if step[l] > size[l] { step[l] } else { size[l] };
-        if most > f64::MIN_POSITIVE { most } else { f64::MIN_POSITIVE }
+        1.0 / if most > f64::MIN_POSITIVE { most } else { f64::MIN_POSITIVE }
     })
 }
 
@@ -390,28 +394,40 @@ impl BatchWorkspace {
             let mut size = NONE;
             for i in 0..n {
                 let step = each(|l| self.correction[i][l].abs());
-                let scale = scale(&self.scale[i], &step);
+                let weight = weight(&self.scale[i], &step);
+                self.weight[i] = weight;
                 good = each(|l| if step[l] < f64::INFINITY { good[l] } else { 0.0 });
                 if iteration == 0 {
                     // What rests is measured otherwise.
                     good = each(|l| if (step[l] == 0.0) & (self.scale[i][l] == 0.0) { 0.0 } else { good[l] });
                 }
-                size = greater(&size, &each(|l| step[l] / scale[l]));
+                size = greater(&size, &each(|l| step[l] * weight[l]));
+            }
+            let mut there = each(|l| if size[l] <= LEAST_CORRECTION { good[l] } else { 0.0 });
+            if there.contains(&1.0) {
+                good = each(|l| if there[l] != 0.0 { 0.0 } else { good[l] });
+                self.add_correction(n, &there);
+                if iteration > 0 {
+                    self.is_continuation(group, iteration, &mut there);
+                }
+                self.keep(group, &mut there);
+                (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
+                if !good.contains(&1.0) {
+                    break;
+                }
             }
             self.evaluate(group, true);
             self.right(group);
             self.back(group);
             let mut next = NONE;
             for i in 0..n {
-                let (step, after) = (each(|l| self.correction[i][l].abs()), each(|l| self.simplified[i][l].abs()));
-                let scale = scale(&self.scale[i], &step);
+                let (after, weight) = (each(|l| self.simplified[i][l].abs()), &self.weight[i]);
                 good = each(|l| if after[l] < f64::INFINITY { good[l] } else { 0.0 });
-                next = greater(&next, &each(|l| after[l] / scale[l]));
+                next = greater(&next, &each(|l| after[l] * weight[l]));
             }
-            let shrinks = truth(|l| (next[l] <= 0.75 * size[l]) | (size[l] <= 2.0 * f64::EPSILON));
+            let shrinks = truth(|l| next[l] <= 0.75 * size[l]);
             let near = truth(|l| (next[l] <= CONTRACTION * size[l]) | (size[l] <= CLOSE_TO_ROUNDING));
             let finished = truth(|l| (near[l] != 0.0) & (next[l] * next[l] <= CONVERGED * size[l]));
-            let done = truth(|l| (finished[l] != 0.0) | (size[l] <= 4.0 * f64::EPSILON));
             good = each(|l| good[l] * shrinks[l]);
             if iteration == 0 {
                 // A first step that does not contract is not for the fast path.
@@ -424,18 +440,28 @@ impl BatchWorkspace {
                 self.scale[i] = greater(&size, &each(|l| moved[l].abs()));
                 self.x[i] = moved;
             }
-            let mut there = each(|l| good[l] * done[l]);
+            let mut there = each(|l| good[l] * finished[l]);
             if there.contains(&1.0) {
                 self.is_continuation(group, iteration, &mut there);
                 self.keep(group, &mut there);
                 (0..LANES).for_each(|l| solved[l] |= there[l] != 0.0);
-                good = each(|l| if done[l] != 0.0 { 0.0 } else { good[l] });
+                good = each(|l| if finished[l] != 0.0 { 0.0 } else { good[l] });
             }
             if !good.contains(&1.0) {
                 break;
             }
         }
         solved
+    }
+
+    /// Goes on by the correction, in these lanes.
+    #[inline(always)]
+    fn add_correction(&mut self, n: usize, there: &Vector) {
+        for i in 0..n {
+            let moved = each(|l| if there[l] != 0.0 { self.x[i][l] + self.correction[i][l] } else { self.x[i][l] });
+            self.scale[i] = greater(&self.scale[i], &each(|l| moved[l].abs()));
+            self.x[i] = moved;
+        }
     }
 
     /// Keeps the solutions of the lanes that have converged, if all is finite there.
@@ -508,8 +534,9 @@ impl BatchWorkspace {
         let mut off = NONE;
         for i in 0..n {
             let first = each(|l| self.first_correction[i][l].abs());
-            let scale = scale(&self.scale[i], &first);
-            most = greater(&most, &each(|l| first[l] / scale[l]));
+            let weight = weight(&self.scale[i], &first);
+            self.first_weight[i] = weight;
+            most = greater(&most, &each(|l| first[l] * weight[l]));
             let start = &self.followed_lanes[self.lanes_in_use].start[i];
             self.simplified[i] = each(|l| self.x[i][l] - start[l]);
         }
@@ -536,8 +563,7 @@ impl BatchWorkspace {
     fn widen_distance(&self, n: usize, off: &mut Vector, good: &mut Vector) {
         for i in 0..n {
             let first = &self.first_correction[i];
-            let scale = scale(&self.scale[i], &each(|l| first[l].abs()));
-            let away = each(|l| (self.simplified[i][l] - first[l]).abs() / scale[l]);
+            let away = each(|l| (self.simplified[i][l] - first[l]).abs() * self.first_weight[i][l]);
             *good = each(|l| if away[l] < f64::INFINITY { good[l] } else { 0.0 });
             *off = greater(off, &away);
         }

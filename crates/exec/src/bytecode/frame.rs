@@ -112,6 +112,8 @@ impl Frame {
                 newton,
             }
         };
+        let mut solvers: Vec<Solver> = program.blocks.values().map(solver).collect();
+        program.positions.iter().for_each(|p| solvers[p.block.0 as usize].newton.positions = true);
         let mut r = vec![0.0; registers.max(layout.size) as usize];
         layout.constants.iter().for_each(|&(register, value)| r[register as usize] = value);
         Frame {
@@ -119,7 +121,7 @@ impl Frame {
             terms: vec![0.0; r.len()],
             r,
             conditions: Conditions::new(program.conditions.values()),
-            solvers: program.blocks.values().map(solver).collect(),
+            solvers,
             set: vec![None; program.parameters.len()],
             varied: None,
             tables: program.tables.clone(),

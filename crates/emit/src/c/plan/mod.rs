@@ -280,7 +280,7 @@ impl<'a> Plan<'a> {
         let newton: Vec<(&Block, usize)> =
             self.newton.iter().zip(&self.reads).map(|(b, &reads)| (&program.blocks[*b], reads)).collect();
         let entries = |b: &Block| b.matrix().values.pattern().len();
-        let work = |&(b, reads): &(&Block, usize)| 18 * b.size() + reads + 2 * entries(b) + full_room(b) + lu(b);
+        let work = |&(b, reads): &(&Block, usize)| 19 * b.size() + reads + 2 * entries(b) + full_room(b) + lu(b);
         let all = linear.iter().copied().chain(newton.iter().map(|b| b.0));
         self.sizes = Sizes {
             derived: writer.givens.derived(),

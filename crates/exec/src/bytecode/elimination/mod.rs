@@ -62,6 +62,14 @@ impl Factors {
         }
     }
 
+    /// The same without refinement: for Newton's method, whose next correction refines this one.
+    pub fn solve_once(&mut self, b: &mut [f64]) {
+        match self {
+            Factors::Full(lu, _) => lu.solve_once(b),
+            Factors::Sparse(lu) => lu.solve_once(b),
+        }
+    }
+
     /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
     pub fn solve_transposed(&mut self, b: &mut [f64]) {
         match self {

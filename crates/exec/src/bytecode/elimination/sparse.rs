@@ -173,6 +173,18 @@ impl SparseLu {
         self.rest = rest;
     }
 
+    /// The same without refinement.
+    pub fn solve_once(&mut self, b: &mut [f64]) {
+        match (self.factored, &mut self.full, &mut self.definite) {
+            (Factored::Full, Some(lu), _) => return lu.solve_once(b),
+            (Factored::Definite, _, Some(definite)) => return definite.solve(&self.symbolic, b),
+            (Factored::Exchanged, _, _) => return self.solve(b),
+            _ => {}
+        }
+        let symbolic = Arc::clone(&self.symbolic);
+        self.substitute(&symbolic, b);
+    }
+
     /// Replaces `b` by the solution of the equations with the matrix transposed. It must have been factored.
     pub fn solve_transposed(&mut self, b: &mut [f64]) {
         match self.factored {

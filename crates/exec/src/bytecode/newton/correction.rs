@@ -1,7 +1,8 @@
 //! Evaluations of a block, Newton corrections and their norms.
 //!
 //! The (ordinary) correction at `x` solves `J(x) dx = -F(x)`; the simplified correction at the trial point solves
-//! `J(x) dx = -F(trial)` with the same factors, which makes it the measure of the natural monotonicity test.
+//! `J(x) dx = -F(trial)` with the same factors, which makes it the measure of the natural monotonicity test. In the iteration
+//! neither is refined: what the solution of one misses, the next one finds.
 
 use super::workspace::Newton;
 use crate::bytecode::frame::{Frame, entries};
@@ -16,7 +17,7 @@ impl Frame {
         let point = if trial { &newton.trial } else { &newton.x };
         solve.guess.iter().zip(point).for_each(|(&g, &x)| self.r[g as usize] = x);
         self.inner::<false>(solve);
-        solve.matrix.iter().chain(&solve.right).all(|&v| self.r[v as usize].is_finite())
+        all_finite(&solve.matrix, &self.r) && all_finite(&solve.right, &self.r)
     }
 
     pub(in crate::bytecode) fn evaluate_root(&mut self, solve: &Solve) -> bool {
@@ -25,6 +26,12 @@ impl Frame {
 
     pub(in crate::bytecode) fn is_exhausted(&mut self, solve: &Solve) -> bool {
         self.newton_of(solve).exhausted()
+    }
+
+    /// Whether all residuals at the point evaluated last are 0.
+    pub(super) fn vanishes(&self, solve: &Solve) -> bool {
+        let offset = &self.solvers[solve.block.0 as usize].newton.offset;
+        solve.right.iter().zip(offset).all(|(&right, &offset)| self.r[right as usize] == offset)
     }
 
     /// Greatest residual at the point evaluated last.
@@ -62,37 +69,30 @@ impl Frame {
         newton.scale_unknowns_at_rest(solve, r);
     }
 
-    /// Scaled maximum norm of the correction; NaN if it is not finite.
+    /// Scaled maximum norm of the correction; NaN if it is not finite. What its unknowns are scaled by is kept.
     pub(super) fn correction_norm(&mut self, solve: &Solve) -> f64 {
         let newton = self.newton_of(solve);
-        let mut most: f64 = 0.0;
-        for i in 0..newton.correction.len() {
-            let size = newton.correction[i].abs();
-            if !size.is_finite() {
-                return f64::NAN;
-            }
-            most = most.max(size / newton.scale[i].max(size).max(f64::MIN_POSITIVE));
-        }
-        most
+        newton.weigh_by_correction();
+        let sizes = newton.correction.iter().zip(&newton.weight).map(|(step, weight)| step.abs() * weight);
+        let most = sizes.fold(0.0, greatest);
+        if most < f64::INFINITY { most } else { f64::NAN }
     }
 
     /// The simplified correction at the point evaluated last, by the Jacobian factored last, and its norm, scaled as
-    /// [`correction_norm`](Self::correction_norm).
-    pub(super) fn simplified_correction_norm(&mut self, solve: &Solve) -> f64 {
+    /// [`weigh_by_correction`](Newton::weigh_by_correction) has said.
+    pub(super) fn simplified_correction_norm(&mut self, solve: &Solve, refined: bool) -> f64 {
         let Frame { r, solvers, .. } = self;
         let solver = &mut solvers[solve.block.0 as usize];
         let newton = &mut solver.newton;
         for (i, &right) in solve.right.iter().enumerate() {
             newton.simplified[i] = newton.offset[i] - r[right as usize];
         }
-        solver.factors.solve(&mut newton.simplified);
-        let mut most: f64 = 0.0;
-        for i in 0..newton.simplified.len() {
-            let scale = newton.scale[i].max(newton.correction[i].abs()).max(f64::MIN_POSITIVE);
-            let size = newton.simplified[i].abs() / scale;
-            most = if size.is_nan() { f64::INFINITY } else { most.max(size) };
+        match refined {
+            true => solver.factors.solve(&mut newton.simplified),
+            false => solver.factors.solve_once(&mut newton.simplified),
         }
-        most
+        let sizes = newton.simplified.iter().zip(&newton.weight).map(|(s, weight)| s.abs() * weight);
+        sizes.fold(0.0, greatest)
     }
 
     /// Leaves a point at which the Jacobian is singular.
@@ -106,11 +106,38 @@ impl Frame {
     }
 }
 
+/// The greater one, infinite where the second is no number. A branch that is seldom taken waits for nothing.
+#[inline]
+pub(super) fn greatest(most: f64, size: f64) -> f64 {
+    match size <= most {
+        true => most,
+        false if size.is_nan() => f64::INFINITY,
+        false => size,
+    }
+}
+
+/// Whether these registers are finite: 0 times what is not is no number.
+fn all_finite(registers: &[u32], r: &[f64]) -> bool {
+    let rest = |v: u32| 0.0 * r[v as usize];
+    let (groups, others) = registers.as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    groups.iter().for_each(|group| (0..4).for_each(|i| sums[i] += rest(group[i])));
+    others.iter().fold(sums.iter().sum(), |sum: f64, &v| sum + rest(v)) == 0.0
+}
+
 impl Newton {
+    /// Scales unknowns by their magnitudes so far, or by their corrections where these are greater.
+    pub(super) fn weigh_by_correction(&mut self) {
+        let sizes = self.scale.iter().zip(&self.correction);
+        for (weight, (scale, step)) in self.weight.iter_mut().zip(sizes) {
+            *weight = 1.0 / scale.max(step.abs()).max(f64::MIN_POSITIVE);
+        }
+    }
+
     /// Goes to the start.
     pub(super) fn begin_iteration(&mut self) {
         self.x.copy_from_slice(&self.start);
-        self.contracts = true;
+        (self.contracts, self.rests) = (true, false);
         self.first_correction.fill(0.0);
         self.first_right.fill(0.0);
         for i in 0..self.x.len() {
@@ -130,6 +157,14 @@ impl Newton {
         self.scale.iter_mut().zip(&self.x).for_each(|(scale, x)| *scale = scale.max(x.abs()));
     }
 
+    /// Goes on by the correction.
+    pub(super) fn add_correction(&mut self) {
+        for i in 0..self.x.len() {
+            self.x[i] += self.correction[i];
+            self.scale[i] = self.scale[i].max(self.x[i].abs());
+        }
+    }
+
     pub(super) fn add_simplified_correction(&mut self) {
         for i in 0..self.x.len() {
             self.x[i] += self.simplified[i];
@@ -140,27 +175,22 @@ impl Newton {
     /// Gives an unknown that is 0, and stays so in the first correction, the magnitude at which it would count in one of
     /// the equations: small changes of it afterwards are no failure of the step. The unknown of a flat law may be one.
     fn scale_unknowns_at_rest(&mut self, solve: &Solve, r: &[f64]) {
-        let n = self.x.len();
-        for j in 0..n {
-            if self.scale[j] != 0.0 || self.correction[j] != 0.0 {
-                continue;
+        let Newton { scale, correction, simplified: least, .. } = self;
+        if scale.iter().zip(&*correction).all(|(&scale, &step)| scale != 0.0 || step != 0.0) {
+            return;
+        }
+        least.fill(f64::INFINITY);
+        for row in (0..scale.len()).map(|row| solve.pattern.row(row)) {
+            let entries = row.map(|e| (solve.pattern.columns()[e] as usize, r[solve.matrix[e] as usize].abs()));
+            // What rests adds nothing.
+            let others = entries.clone().fold(0.0, |sum, (k, entry)| sum + entry * scale[k].max(correction[k].abs()));
+            for (k, own) in entries.filter(|&(_, own)| own > 0.0 && others > 0.0) {
+                least[k] = least[k].min(others / own);
             }
-            let mut least = f64::INFINITY;
-            for row in 0..n {
-                let (mut own, mut others) = (0.0, 0.0);
-                for e in solve.pattern.row(row) {
-                    let (k, entry) = (solve.pattern.columns()[e] as usize, r[solve.matrix[e] as usize].abs());
-                    match k == j {
-                        true => own = entry,
-                        false => others += entry * self.scale[k].max(self.correction[k].abs()),
-                    }
-                }
-                if own > 0.0 && others > 0.0 {
-                    least = least.min(others / own);
-                }
-            }
-            if least < f64::INFINITY {
-                self.scale[j] = least;
+        }
+        for ((scale, &step), &least) in scale.iter_mut().zip(&*correction).zip(&*least) {
+            if *scale == 0.0 && step == 0.0 && least < f64::INFINITY {
+                *scale = least;
             }
         }
     }

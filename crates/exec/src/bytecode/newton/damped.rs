@@ -22,6 +22,10 @@ pub(in crate::bytecode) const CONTRACTION: f64 = 0.25;
 /// below this, rounding.
 pub(in crate::bytecode) const CONVERGED: f64 = 0.125 * f64::EPSILON;
 
+/// Where a correction is not longer than this it leads to the root. Positions are looked at once more: where a motion stands
+/// still, rounding must not move them.
+pub(in crate::bytecode) const LEAST_CORRECTION: f64 = 4.0 * f64::EPSILON;
+
 /// How far from its first guess an iteration may lead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Globalization {
@@ -60,7 +64,7 @@ impl Frame {
         self.newton_of(solve).valued = true;
         let most = self.iteration_limit(solve, globalization);
         for iteration in 0..most {
-            if self.residual(solve) == 0.0 {
+            if self.vanishes(solve) {
                 return Ok(());
             }
             let newton = self.newton_of(solve);
@@ -75,12 +79,19 @@ impl Frame {
                 continue;
             }
             self.newton_correction(solve);
+            self.newton_of(solve).first_factors = iteration == 0;
             if iteration == 0 {
                 self.store_first_correction(solve);
             }
             let norm = self.correction_norm(solve);
             if !norm.is_finite() {
                 break;
+            }
+            let newton = self.newton_of(solve);
+            if norm <= LEAST_CORRECTION && !newton.positions {
+                newton.rests = iteration == 0;
+                newton.add_correction();
+                return Ok(());
             }
             let (outcome, contracts) = self.damped_step(solve, norm, globalization);
             self.newton_of(solve).contracts &= iteration > 0 || contracts;
@@ -125,7 +136,7 @@ impl Frame {
         loop {
             self.newton_of(solve).set_trial(damping);
             if self.evaluate(solve, true) {
-                let simplified = self.simplified_correction_norm(solve);
+                let simplified = self.simplified_correction_norm(solve, false);
                 if simplified <= (1.0 - 0.25 * damping) * norm || norm <= 2.0 * f64::EPSILON {
                     return self.accept_step(solve, damping, norm, simplified);
                 }
@@ -151,7 +162,7 @@ impl Frame {
             newton.add_simplified_correction();
             return (StepOutcome::Converged, true);
         }
-        (if norm <= 4.0 * f64::EPSILON { StepOutcome::Converged } else { StepOutcome::Accepted }, contracts)
+        (if norm <= LEAST_CORRECTION { StepOutcome::Converged } else { StepOutcome::Accepted }, contracts)
     }
 
     /// No damping factor passes: there is a nonsmooth point, or the residuals are rounding, or the iteration fails.

@@ -34,7 +34,7 @@ mod scan;
 mod search;
 mod workspace;
 
-pub(super) use damped::{CONTRACTION, CONVERGED};
+pub(super) use damped::{CONTRACTION, CONVERGED, LEAST_CORRECTION};
 pub(crate) use workspace::{Followed, Newton};
 
 /// A correction below this part of the unknowns that no longer gets shorter is rounding.

@@ -1,6 +1,7 @@
 //! Whether a root is the continuation of the one at which the iteration started.
 
 use super::CLOSE_TO_ROUNDING;
+use super::correction::greatest;
 use super::workspace::Newton;
 use crate::bytecode::frame::{Frame, entries};
 use crate::bytecode::instruction::Solve;
@@ -18,21 +19,25 @@ impl Frame {
     pub(super) fn is_continuation(&mut self, solve: &Solve) -> bool {
         let solver = &mut self.solvers[solve.block.0 as usize];
         let newton = &mut solver.newton;
-        if !newton.contracts || newton.first_correction.iter().all(|&first| first == 0.0) {
+        let rests = newton.rests || newton.first_correction.iter().all(|&first| first == 0.0);
+        if !newton.contracts || rests {
             return newton.contracts;
         }
         let n = newton.x.len();
         let mut most = CLOSE_TO_ROUNDING;
         for i in 0..n {
             let first = newton.first_correction[i].abs();
-            most = most.max(first / newton.scale[i].max(first).max(f64::MIN_POSITIVE));
+            newton.weight[i] = 1.0 / newton.scale[i].max(first).max(f64::MIN_POSITIVE);
+            most = greatest(most, first * newton.weight[i]);
             newton.simplified[i] = newton.x[i] - newton.start[i];
         }
-        let off = newton.distance_from_first_correction();
-        // What the first correction would have been with the last Jacobian.
-        newton.simplified.copy_from_slice(&newton.first_right);
-        solver.factors.solve(&mut newton.simplified);
-        let off = off.max(newton.distance_from_first_correction());
+        let mut off = newton.distance_from_first_correction();
+        // What the first correction would have been with the last Jacobian; with the first one it is itself.
+        if !newton.first_factors {
+            newton.simplified.copy_from_slice(&newton.first_right);
+            solver.factors.solve_once(&mut newton.simplified);
+            off = off.max(newton.distance_from_first_correction());
+        }
         if !newton.following {
             return off <= 0.5 * most;
         }
@@ -42,7 +47,7 @@ impl Frame {
             let terms = row.map(|e| newton.start_jacobian[e] * newton.first_correction[columns[e] as usize]);
             newton.simplified[i] = terms.sum();
         }
-        solver.factors.solve(&mut newton.simplified);
+        solver.factors.solve_once(&mut newton.simplified);
         off.max(newton.distance_from_first_correction()) <= 0.5 * most
     }
 
@@ -58,12 +63,13 @@ impl Frame {
         if ![1.0, 0.0].into_iter().any(|part| self.evaluate_on_path(solve, part) && self.factor(solve)) {
             return false;
         }
+        self.newton_of(solve).weigh_by_correction();
         let mut before = f64::INFINITY;
         for point in 0..=points {
             if !self.evaluate_on_path(solve, point as f64 / points as f64) {
                 return false;
             }
-            let level = self.simplified_correction_norm(solve);
+            let level = self.simplified_correction_norm(solve, true);
             if level.is_nan() || level > before * (1.0 + CLOSE_TO_ROUNDING) + CLOSE_TO_ROUNDING {
                 return false;
             }
@@ -131,9 +137,7 @@ impl Newton {
     fn distance_from_first_correction(&self) -> f64 {
         let mut most: f64 = 0.0;
         for i in 0..self.simplified.len() {
-            let (first, off) = (self.first_correction[i], (self.simplified[i] - self.first_correction[i]).abs());
-            let size = self.scale[i].max(first.abs()).max(f64::MIN_POSITIVE);
-            most = if off.is_nan() { f64::INFINITY } else { most.max(off / size) };
+            most = greatest(most, (self.simplified[i] - self.first_correction[i]).abs() * self.weight[i]);
         }
         most
     }

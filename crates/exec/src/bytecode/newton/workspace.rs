@@ -37,6 +37,8 @@ pub(crate) struct Newton {
     pub(in crate::bytecode) simplified: Vec<f64>,
     /// Scale of norms: greatest magnitude of each unknown so far.
     pub(super) scale: Vec<f64>,
+    /// The inverse of the scale of each unknown, or of its correction where that is greater.
+    pub(super) weight: Vec<f64>,
     /// Least scales, below which unknowns are rounding; 0 unless a solution is sought that is not found without them.
     pub(in crate::bytecode) floor: Vec<f64>,
     /// What is subtracted from the residuals: the Newton homotopy `F(x) = (1 - s) F(previous)`.
@@ -55,8 +57,14 @@ pub(crate) struct Newton {
     pub(super) start_jacobian: Vec<f64>,
     /// Magnitudes of the unknowns: the previous solution, or where the iteration from there led.
     pub(in crate::bytecode) magnitude: Vec<f64>,
+    /// Whether the factors at hand are those of the first correction.
+    pub(super) first_factors: bool,
+    /// Whether the root is where the iteration began, but for a first correction that is rounding.
+    pub(super) rests: bool,
     /// Whether the first step, undamped, contracted by [`CONTRACTION`](super::CONTRACTION).
     pub(super) contracts: bool,
+    /// Whether its unknowns are positions that constraints determine.
+    pub(in crate::bytecode) positions: bool,
     /// Of positions: how they move at the previous solution, and where that leads.
     pub motion: Motion,
     pub(super) expected: Vec<f64>,
@@ -103,6 +111,7 @@ impl Newton {
             trial: line.clone(),
             simplified: line.clone(),
             scale: line.clone(),
+            weight: line.clone(),
             floor: line.clone(),
             offset: line.clone(),
             previous_residual: line.clone(),
@@ -112,7 +121,10 @@ impl Newton {
             first_right: line.clone(),
             magnitude: line,
             start_jacobian: matrix,
+            positions: false,
             motion: Motion::default(),
+            first_factors: false,
+            rests: false,
             contracts: false,
             valued: false,
             floating: Floating::new(size, sparse),

@@ -6,11 +6,21 @@ static $real ha_distance_from_first_correction(const ha_newton *w)
     int i;
     for (i = 0; i < w->n; ++i) {
         const $real first = w->first_correction[i];
-        const $real off = $fabs(w->simplified[i] - first);
-        const $real scale = $ha_max($ha_max(w->scale[i], $fabs(first)), $DBL_MIN);
-        most = off != off ? $HUGE_VAL : $ha_max(most, off / scale);
+        most = $ha_greatest(most, $fabs(w->simplified[i] - first) * w->weight[i]);
     }
     return most;
+}
+
+//item ha_all_zero
+static int ha_all_zero(const $real *a, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        if (a[i] != $0.0) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 //item ha_is_continuation
@@ -21,27 +31,24 @@ static int ha_is_continuation(ha_newton *w)
     const int n = w->n;
     $real most = $CLOSE_TO_ROUNDING;
     $real off;
-    int still = 1;
     int i;
     int e;
-    for (i = 0; i < n; ++i) {
-        if (w->first_correction[i] != $0.0) {
-            still = 0;
-        }
-    }
-    if (!w->contracts || still) {
+    if (!w->contracts || w->rests || $ha_all_zero(w->first_correction, n)) {
         return w->contracts;
     }
     for (i = 0; i < n; ++i) {
         const $real first = $fabs(w->first_correction[i]);
-        most = $ha_max(most, first / $ha_max($ha_max(w->scale[i], first), $DBL_MIN));
+        w->weight[i] = $1.0 / $ha_max($ha_max(w->scale[i], first), $DBL_MIN);
+        most = $ha_greatest(most, first * w->weight[i]);
         w->simplified[i] = w->x[i] - w->start[i];
     }
     off = $ha_distance_from_first_correction(w);
-    /* What the first correction would have been with the last Jacobian. */
-    $ha_copy(w->simplified, w->first_right, n);
-    $ha_lu_solve(&w->lu, w->simplified);
-    off = $ha_max(off, $ha_distance_from_first_correction(w));
+    /* What the first correction would have been with the last Jacobian; with the first one it is itself. */
+    if (!w->first_factors) {
+        $ha_copy(w->simplified, w->first_right, n);
+        $ha_lu_solve_once(&w->lu, w->simplified);
+        off = $ha_max(off, $ha_distance_from_first_correction(w));
+    }
     if (!w->following) {
         return off <= $0.5 * most;
     }
@@ -54,7 +61,7 @@ static int ha_is_continuation(ha_newton *w)
         }
         w->simplified[i] = sum;
     }
-    $ha_lu_solve(&w->lu, w->simplified);
+    $ha_lu_solve_once(&w->lu, w->simplified);
     return $ha_max(off, $ha_distance_from_first_correction(w)) <= $0.5 * most;
 }
 
@@ -83,12 +90,13 @@ static int ha_path_is_regular_at(ha_model *m, ha_newton *w, int points)
         && !($ha_evaluate_on_path(m, w, $0.0) && $ha_newton_factor(w))) {
         return 0;
     }
+    $ha_weigh_by_correction(w);
     for (point = 0; point <= points; ++point) {
         $real level;
         if (!$ha_evaluate_on_path(m, w, ($real)point / ($real)points)) {
             return 0;
         }
-        level = $ha_simplified_correction_norm(w);
+        level = $ha_simplified_correction_norm(w, 1);
         if (level != level || level > before * ($1.0 + $CLOSE_TO_ROUNDING) + $CLOSE_TO_ROUNDING) {
             return 0;
         }

@@ -19,16 +19,17 @@ static int ha_evaluate_on_path(ha_model *m, ha_newton *w, $real part)
     return $ha_evaluate(m, w, w->trial);
 }
 
-//item ha_residual
-/* Greatest residual at the point evaluated last. */
-static $real ha_residual(const ha_newton *w)
+//item ha_vanishes
+/* Whether all residuals at the point evaluated last are 0. */
+static int ha_vanishes(const ha_newton *w)
 {
-    $real most = $0.0;
     int i;
     for (i = 0; i < w->n; ++i) {
-        most = $ha_max(most, $fabs(w->right[i] - w->offset[i]));
+        if (w->right[i] != w->offset[i]) {
+            return 0;
+        }
     }
-    return most;
+    return 1;
 }
 
 //item ha_newton_factor
@@ -47,37 +48,57 @@ static void ha_newton_correction(ha_newton *w)
     $ha_lu_solve(&w->lu, w->correction);
 }
 
+//item ha_greatest
+/* The greater one, infinite where the second is no number. A branch that is seldom taken waits for nothing. */
+static $real ha_greatest($real most, $real size)
+{
+    if (!(size <= most)) {
+        return size != size ? $HUGE_VAL : size;
+    }
+    return most;
+}
+
+//item ha_weigh_by_correction
+/* Scales unknowns by their magnitudes so far, or by their corrections where these are greater. */
+static void ha_weigh_by_correction(ha_newton *w)
+{
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        w->weight[i] = $1.0 / $ha_max($ha_max(w->scale[i], $fabs(w->correction[i])), $DBL_MIN);
+    }
+}
+
 //item ha_correction_norm
-/* Scaled maximum norm of the correction. */
-static $real ha_correction_norm(const ha_newton *w)
+/* Scaled maximum norm of the correction; what its unknowns are scaled by is kept. */
+static $real ha_correction_norm(ha_newton *w)
 {
     $real most = $0.0;
     int i;
+    $ha_weigh_by_correction(w);
     for (i = 0; i < w->n; ++i) {
-        const $real size = $fabs(w->correction[i]);
-        if (!$ha_finite(size)) {
-            return $HUGE_VAL;
-        }
-        most = $ha_max(most, size / $ha_max($ha_max(w->scale[i], size), $DBL_MIN));
+        most = $ha_greatest(most, $fabs(w->correction[i]) * w->weight[i]);
     }
     return most;
 }
 
 //item ha_simplified_correction_norm
-/* The simplified correction at the point evaluated last, by the Jacobian factored last, and its norm, scaled as that of the
- * correction. */
-static $real ha_simplified_correction_norm(ha_newton *w)
+/* The simplified correction at the point evaluated last, by the Jacobian factored last, and its norm, scaled as
+ * ha_weigh_by_correction has said. */
+static $real ha_simplified_correction_norm(ha_newton *w, int refined)
 {
     $real most = $0.0;
     int i;
     for (i = 0; i < w->n; ++i) {
         w->simplified[i] = w->offset[i] - w->right[i];
     }
-    $ha_lu_solve(&w->lu, w->simplified);
+    if (refined) {
+        $ha_lu_solve(&w->lu, w->simplified);
+    } else {
+        $ha_lu_solve_once(&w->lu, w->simplified);
+    }
     for (i = 0; i < w->n; ++i) {
-        const $real scale = $ha_max($ha_max(w->scale[i], $fabs(w->correction[i])), $DBL_MIN);
-        const $real size = $fabs(w->simplified[i]) / scale;
-        most = size != size ? $HUGE_VAL : $ha_max(most, size);
+        const $real size = $fabs(w->simplified[i]) * w->weight[i];
+        most = $ha_greatest(most, size);
     }
     return most;
 }
@@ -88,32 +109,35 @@ static $real ha_simplified_correction_norm(ha_newton *w)
 static void ha_scale_unknowns_at_rest(ha_newton *w)
 {
     const int n = w->n;
-    int i;
-    int j;
+    $real *least = w->simplified;
+    int i = 0;
     int e;
-    for (j = 0; j < n; ++j) {
-        $real least = $HUGE_VAL;
-        if (w->scale[j] != $0.0 || w->correction[j] != $0.0) {
-            continue;
+    while (i < n && (w->scale[i] != $0.0 || w->correction[i] != $0.0)) {
+        ++i;
+    }
+    if (i == n) {
+        return;
+    }
+    $ha_fill(least, $HUGE_VAL, n);
+    for (i = 0; i < n; ++i) {
+        /* What rests adds nothing. */
+        $real others = $0.0;
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            const int k = w->columns[e];
+            const $real term = $fabs(w->matrix[e]) * $ha_max(w->scale[k], $fabs(w->correction[k]));
+            others += term;
         }
-        for (i = 0; i < n; ++i) {
-            $real own = $0.0;
-            $real others = $0.0;
-            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
-                const int k = w->columns[e];
-                if (k == j) {
-                    own = $fabs(w->matrix[e]);
-                } else {
-                    const $real term = $fabs(w->matrix[e]) * $ha_max(w->scale[k], $fabs(w->correction[k]));
-                    others += term;
-                }
-            }
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            const int k = w->columns[e];
+            const $real own = $fabs(w->matrix[e]);
             if (own > $0.0 && others > $0.0) {
-                least = others / own < least ? others / own : least;
+                least[k] = others / own < least[k] ? others / own : least[k];
             }
         }
-        if ($ha_finite(least)) {
-            w->scale[j] = least;
+    }
+    for (i = 0; i < n; ++i) {
+        if (w->scale[i] == $0.0 && w->correction[i] == $0.0 && $ha_finite(least[i])) {
+            w->scale[i] = least[i];
         }
     }
 }
@@ -137,6 +161,16 @@ static void ha_accept_trial(ha_newton *w)
     int i;
     $ha_copy(w->x, w->trial, w->n);
     for (i = 0; i < w->n; ++i) {
+        w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
+    }
+}
+
+//item ha_add_correction
+static void ha_add_correction(ha_newton *w)
+{
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        w->x[i] += w->correction[i];
         w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
     }
 }

@@ -97,7 +97,7 @@ static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalizati
             w->trial[i] = w->x[i] + move;
         }
         if ($ha_evaluate(m, w, w->trial)) {
-            const $real simplified = $ha_simplified_correction_norm(w);
+            const $real simplified = $ha_simplified_correction_norm(w, 0);
             if (simplified <= ($1.0 - $0.25 * damping) * norm || norm <= $2.0 * $DBL_EPSILON) {
                 $ha_accept_trial(w);
                 *contracts = damping == $1.0 && (simplified <= $0.25 * norm || norm <= $CLOSE_TO_ROUNDING);
@@ -139,6 +139,7 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
     int i;
     $ha_copy(w->x, w->start, n);
     w->contracts = 1;
+    w->rests = 0;
     $ha_fill(w->first_correction, $0.0, n);
     $ha_fill(w->first_right, $0.0, n);
     for (i = 0; i < n; ++i) {
@@ -152,7 +153,7 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
         $real norm;
         int contracts;
         int outcome;
-        if ($ha_residual(w) == $0.0) {
+        if ($ha_vanishes(w)) {
             return 1;
         }
         if (w->evaluations >= w->limit || w->evaluations > last_evaluation) {
@@ -166,6 +167,7 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
             continue;
         }
         $ha_newton_correction(w);
+        w->first_factors = iteration == 0;
         if (iteration == 0) {
             $ha_copy(w->first_correction, w->correction, n);
             for (i = 0; i < n; ++i) {
@@ -176,6 +178,11 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
         norm = $ha_correction_norm(w);
         if (!$ha_finite(norm)) {
             return 0;
+        }
+        if (norm <= $4.0 * $DBL_EPSILON && !w->positions) {
+            w->rests = iteration == 0;
+            $ha_add_correction(w);
+            return 1;
         }
         outcome = $ha_damped_step(m, w, norm, globalization, &contracts);
         w->contracts = w->contracts && (iteration > 0 || contracts);

@@ -39,6 +39,12 @@ typedef struct {
     int evaluations;
     /* Whether the first step, undamped, contracted by 1/4. */
     int contracts;
+    /* Whether its unknowns are positions that constraints determine. */
+    int positions;
+    /* Whether the factors at hand are those of the first correction. */
+    int first_factors;
+    /* Whether the root is where the iteration began, but for a first correction that is rounding. */
+    int rests;
     /* Whether the laws had a value where an iteration began. */
     int valued;
     /* The previous solution, what the block read there, and its Jacobian. */
@@ -53,8 +59,9 @@ typedef struct {
     $real *correction;
     $real *trial;
     $real *simplified;
-    /* Scale of norms: greatest magnitude of each unknown so far. */
+    /* Scale of norms: greatest magnitude of each unknown so far; its inverse, as far as a correction is no greater. */
     $real *scale;
+    $real *weight;
     /* What is subtracted from the residuals: the Newton homotopy F(x) = (1 - s) F(previous). */
     $real *offset;
     $real *previous_residual;
@@ -115,6 +122,13 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.limit = w.following ? m->most_evaluations : 20000;
     w.evaluations = 0;
     w.contracts = 0;
+    w.first_factors = 0;
+    w.rests = 0;
+//if sought_positions
+    w.positions = w.block->position;
+//else
+    w.positions = 0;
+//end
     w.valued = 0;
     w.previous = $ha_take(&place, n);
     w.previous_outer = $ha_take(&place, reads);
@@ -135,6 +149,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.trial = $ha_take(&place, n);
     w.simplified = $ha_take(&place, n);
     w.scale = $ha_take(&place, n);
+    w.weight = $ha_take(&place, n);
     w.offset = $ha_take(&place, n);
     w.previous_residual = $ha_take(&place, n);
     w.start = $ha_take(&place, n);
