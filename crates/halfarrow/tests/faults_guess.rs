@@ -68,6 +68,23 @@ fn what_is_not_guessed_is_searched_from_zero() {
     starts_at(&text, &[("coupler0", -1.2)], Form::Minimal, &[("th2", th2), ("th3", th3)]);
 }
 
+/// An angle tells its sine, and not the other way round, in whatever order they are guessed.
+#[test]
+fn a_position_is_guessed_by_itself_before_what_follows_from_it() {
+    let th: f64 = -2.617993877991494;
+    for states in ["state y' = lift.f\nstate th' = arm.f\n", "state th' = arm.f\nstate y' = lift.f\n"] {
+        let text = format!(
+            "model Arm\n1:lift -> I:two(1)\n1:far -> I:three(1)\n1:arm -> I:one(1)\nstate x' = far.f\n{states}\
+             guess y = {:?}, x = {:?}, th = {th:?}\nconstraint height: y = sin(th)\nconstraint way: x = cos(th)\n",
+            th.sin(),
+            th.cos()
+        );
+        for form in [Form::Minimal, Form::Kane, Form::Lagrange] {
+            starts_at(&text, &[], form, &[("th", th), ("x", th.cos()), ("y", th.sin())]);
+        }
+    }
+}
+
 /// The angle itself may be the displacement of a spring, or that of a spring beside it.
 #[test]
 fn displacements_of_springs_are_guessed() {

@@ -8,7 +8,7 @@ use super::kept::kept;
 use super::lower::Lowering;
 use super::op::Op;
 use super::sharing::share;
-use super::start::place_guesses;
+use super::start::{is_linear, place_guesses};
 use super::values::Reads;
 use super::{
     Block, BlockId, ConditionId, HeldSignal, Implicit, Input, Matrix, Moved, Observed, Parameter, PivotGuard, Position,
@@ -325,7 +325,7 @@ impl Schedule<'_> {
             clauses,
             set_valued,
             start: start(equations, &conditions, &at_start),
-            guesses: placed(equations, &guesses, &at_start),
+            guesses: placed(equations, &guesses, &at_start, |v| is_linear(&values, &positions, v)),
             conditions: triggers::conditions(flow, &tables, &found, integrated, &nonsmooth),
             dependence: rates.iter().map(|&rate| dependence.states_of(rate)).collect(),
             tracked: equations.tracked.iter().copied().chain(equations.algebraic.iter().map(|a| a.tracked)).collect(),
@@ -444,7 +444,12 @@ fn start(equations: &Equations, values: &[Vanishing], dependence: &Dependence) -
 }
 
 /// Guesses in the order in which they are placed.
-fn placed(equations: &Equations, values: &[Vanishing], dependence: &Dependence) -> Vec<StartGuess> {
+fn placed(
+    equations: &Equations,
+    values: &[Vanishing],
+    dependence: &Dependence,
+    is_linear: impl Fn(Value) -> bool,
+) -> Vec<StartGuess> {
     let reads: Vec<&[u32]> = values.iter().map(|v| dependence.unknowns_of(v.residual)).collect();
     let guess = |(i, unknown): (usize, u32)| StartGuess {
         name: equations.guesses[i].name.clone(),
@@ -454,7 +459,8 @@ fn placed(equations: &Equations, values: &[Vanishing], dependence: &Dependence) 
         reads: reads[i].to_vec(),
         span: equations.guesses[i].span,
     };
-    place_guesses(&reads).into_iter().map(guess).collect()
+    let linear: Vec<bool> = values.iter().map(|v| is_linear(v.residual)).collect();
+    place_guesses(&reads, &linear).into_iter().map(guess).collect()
 }
 
 /// What the equations are, where they are no explicit rates.

@@ -1,8 +1,10 @@
 //! Which start conditions belong together, and which unknown each guess is for.
 
+use super::op::Op;
+use super::values::{Reads, Values};
+use super::{Position, Program, StartCondition, Value};
+use rustc_hash::FxHashSet;
 use std::collections::{BTreeMap, BTreeSet};
-
-use super::{Program, StartCondition};
 
 /// Start conditions that share unknowns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -43,11 +45,31 @@ impl Program {
     }
 }
 
+/// Whether a value is linear in states and positions: one step of Newton then tells where it vanishes.
+pub(super) fn is_linear(values: &Values, positions: &[Position], value: Value) -> bool {
+    let (mut open, mut seen) = (vec![value], FxHashSet::default());
+    while let Some(v) = open.pop() {
+        if values.reads(v) == Reads::PARAMETERS || !seen.insert(v) || positions.iter().any(|p| p.value == v) {
+            continue;
+        }
+        let fixed = |v| values.reads(v) == Reads::PARAMETERS;
+        match values.op(v) {
+            Op::State(_) | Op::Conserved(_) => {}
+            Op::Neg(a) => open.push(a),
+            Op::Add(a, b) | Op::Sub(a, b) => open.extend([a, b]),
+            Op::Mul(a, b) if fixed(a) => open.push(b),
+            Op::Mul(a, b) | Op::Div(a, b) if fixed(b) => open.push(a),
+            _ => return false,
+        }
+    }
+    true
+}
+
 /// Where guesses go that read these unknowns, in the order in which they are placed: the number of the guess and its
-/// unknown. A guess places the only unknown that it reads which is not placed yet, first those that read fewest: what is
-/// guessed of an unknown itself goes before what others have it follow from. Where there is no such guess, the first guess
-/// places the first such. Guesses for which no unknown is left are left out.
-pub(super) fn place_guesses(reads: &[&[u32]]) -> Vec<(usize, u32)> {
+/// unknown. A guess places the only unknown that it reads which is not placed yet, first those that read fewest, of these
+/// those that are linear: what is guessed of an unknown itself goes before what others have it follow from. Where there is no
+/// such guess, the first guess places the first such. Guesses for which no unknown is left are left out.
+pub(super) fn place_guesses(reads: &[&[u32]], linear: &[bool]) -> Vec<(usize, u32)> {
     let mut left: Vec<usize> = (0..reads.len()).collect();
     let mut placed: BTreeSet<u32> = BTreeSet::new();
     let mut places = Vec::new();
@@ -58,7 +80,8 @@ pub(super) fn place_guesses(reads: &[&[u32]]) -> Vec<(usize, u32)> {
             return places;
         }
         let telling = (0..left.len()).filter(|&at| open(left[at]).count() == 1);
-        let guess = left.remove(telling.min_by_key(|&at| reads[left[at]].len()).unwrap_or(0));
+        let fewest = telling.min_by_key(|&at| (reads[left[at]].len(), !linear[left[at]]));
+        let guess = left.remove(fewest.unwrap_or(0));
         let unknown = open(guess).next().expect("one is open");
         placed.insert(unknown);
         places.push((guess, unknown));
@@ -80,9 +103,12 @@ mod tests {
 
     #[test]
     fn a_guess_places_the_only_unknown_that_is_left() {
-        assert_eq!(place_guesses(&[&[0, 1], &[1], &[]]), [(1, 1), (0, 0)]);
-        assert_eq!(place_guesses(&[&[0, 1], &[0, 1], &[0]]), [(2, 0), (0, 1)]);
-        assert_eq!(place_guesses(&[&[2, 3], &[2, 3]]), [(0, 2), (1, 3)]);
-        assert_eq!(place_guesses(&[&[0], &[0, 1], &[1]]), [(0, 0), (2, 1)]);
+        let place = |reads: &[&[u32]]| place_guesses(reads, &vec![true; reads.len()]);
+        assert_eq!(place(&[&[0, 1], &[1], &[]]), [(1, 1), (0, 0)]);
+        assert_eq!(place(&[&[0, 1], &[0, 1], &[0]]), [(2, 0), (0, 1)]);
+        assert_eq!(place(&[&[2, 3], &[2, 3]]), [(0, 2), (1, 3)]);
+        assert_eq!(place(&[&[0], &[0, 1], &[1]]), [(0, 0), (2, 1)]);
+        // An angle and a place that follows from it.
+        assert_eq!(place_guesses(&[&[0], &[0], &[1]], &[false, true, true]), [(1, 0), (2, 1)]);
     }
 }
