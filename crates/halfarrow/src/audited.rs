@@ -98,7 +98,7 @@ struct Book {
 
 impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// Audits what `model` computes; what it records stays what it is.
-    pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
+    pub fn new(model: &'a mut M, graph: &Arc<BondGraph>) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked = model.recorded().to_vec();
         let mut wanted = Wanted::new(observed, graph);

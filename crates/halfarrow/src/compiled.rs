@@ -97,7 +97,7 @@ impl Model {
         };
         let inputs = shared.shares.iter().map(|share| share.index()).collect();
         let mut model = self.clone();
-        model.graph = shared.graph;
+        model.graph = Arc::new(shared.graph);
         let mut compiled = model.compile(form)?;
         compiled.shares = true;
         if let Ready::Explicit(system) = &mut compiled.ready {
