@@ -17,6 +17,8 @@ const LARGEST: usize = 48;
 const SMALL: usize = 8;
 const EMPTY: SetId = SetId(0);
 const LARGE: SetId = SetId(1);
+/// Sets of one symbol are numbered by it, from here on.
+const SINGLES: u32 = 1 << 31;
 
 #[derive(Clone)]
 pub(super) struct SymbolSets {
@@ -26,12 +28,19 @@ pub(super) struct SymbolSets {
     ends: Vec<u32>,
     ids: HashTable<u32>,
     unions: FxHashMap<(SetId, SetId), SetId>,
+    /// The symbols up to the last that is a set alone: the members of such sets.
+    singles: Vec<Symbol>,
 }
 
 impl Default for SymbolSets {
     fn default() -> Self {
-        let mut sets =
-            SymbolSets { members: Vec::new(), ends: vec![0; 2], ids: HashTable::new(), unions: FxHashMap::default() };
+        let mut sets = SymbolSets {
+            members: Vec::new(),
+            ends: vec![0; 2],
+            ids: HashTable::new(),
+            unions: FxHashMap::default(),
+            singles: Vec::new(),
+        };
         sets.ids.insert_unique(hash_of(&[]), EMPTY.0, |_| hash_of(&[]));
         sets
     }
@@ -39,16 +48,28 @@ impl Default for SymbolSets {
 
 impl SymbolSets {
     fn get(&self, id: SetId) -> Option<&[Symbol]> {
-        (id != LARGE).then(|| members(&self.members, &self.ends, id.0))
+        match id {
+            LARGE => None,
+            SetId(single @ SINGLES..) => self.singles.get((single - SINGLES) as usize).map(std::slice::from_ref),
+            SetId(id) => Some(members(&self.members, &self.ends, id)),
+        }
     }
 
     fn len(&self, id: SetId) -> usize {
-        members(&self.members, &self.ends, id.0).len()
+        self.get(id).map_or(0, <[Symbol]>::len)
+    }
+
+    fn single(&mut self, symbol: Symbol) -> SetId {
+        let known = self.singles.len() as u32;
+        self.singles.extend((known..symbol.0 + 1).map(Symbol));
+        SetId(SINGLES + symbol.0)
     }
 
     fn intern(&mut self, symbols: &[Symbol]) -> SetId {
-        if symbols.len() > LARGEST {
-            return LARGE;
+        match symbols {
+            &[symbol] => return self.single(symbol),
+            _ if symbols.len() > LARGEST => return LARGE,
+            _ => {}
         }
         let SymbolSets { members: all, ends, ids, .. } = self;
         let hash = hash_of(symbols);
@@ -137,7 +158,7 @@ impl IntoIterator for Symbols {
 impl Exprs {
     pub(super) fn symbols_of_node(&mut self, node: &Node) -> SetId {
         if let Node::Symbol(s) = node {
-            return self.sets.intern(&[*s]);
+            return self.sets.single(*s);
         }
         let (entries, sets) = (&self.entries, &mut self.sets);
         let of = |e: Expr| entries[e.0 as usize].symbols;
