@@ -221,6 +221,7 @@ impl<'a> Rows<'a> {
         }
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent);
         self.cancelling = needed;
+        self.short = Map::new();
         for_junctions(&mut all, &independent.map(|p| (p.output, ())).collect());
         let last = |mut symbol: Symbol| {
             while let Some(&[(other, ONE)]) = all.get(&symbol).map(|row| &row.0[..]) {
@@ -228,8 +229,9 @@ impl<'a> Rows<'a> {
             }
             symbol
         };
-        let renamed = all.iter().map(|(&symbol, row)| (symbol, row.renamed(x, &last)));
-        renamed.collect()
+        let mut renamed = Vec::with_capacity(all.len());
+        renamed.extend(all.iter().map(|(&symbol, row)| (symbol, row.renamed(x, &last))));
+        renamed
     }
 }
 
