@@ -28,6 +28,7 @@ pub use report::report;
 pub use run::simulate;
 pub use sweep::sweep;
 
+use std::mem::ManuallyDrop;
 use std::time::Instant;
 
 use halfarrow::{Error, FixedMethod, Form, Model, Override, Problem, Source, StageTime, Start};
@@ -42,6 +43,8 @@ fn with_model(arguments: &ModelArguments, go_on: impl FnOnce(&Model) -> Result<u
     let set = overrides(arguments);
     let loaded = source(&arguments.model).map_err(Error::from).and_then(|source| Model::new(source, &set));
     let outcome = loaded.and_then(|model| {
+        // The process ends with the command: a large model is not given back piece by piece before.
+        let model = ManuallyDrop::new(model);
         screen::warn(model.warnings());
         if let Some(absent) = model.absent() {
             return Err(absent.into());

@@ -72,6 +72,9 @@ fn fixed(graph: &BondGraph) -> impl Iterator<Item = &Element> {
     graph.elements.iter().filter(move |(id, _)| !set_valued.contains(id)).map(|(_, element)| element)
 }
 
+/// Laws with expressions that are read together at most: what bounds the memory of large models.
+const TOGETHER: usize = 4096;
+
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
     (graph, shares, quotients): (&BondGraph, &[Share], &Quotients),
@@ -96,6 +99,10 @@ pub(crate) fn residual(
             if let Err(missing) = check.law(&element.name, law, &mut written) {
                 unchecked.push(format!("a law of {}: {missing} is not known", element.name));
             }
+        }
+        if written.len() >= TOGETHER {
+            check.written(&written);
+            written.clear();
         }
     }
     for share in shares {

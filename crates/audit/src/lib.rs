@@ -30,7 +30,7 @@ mod values;
 mod worst;
 
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::bond_graph::BondGraph;
+use halfarrow_compiler::bond_graph::{BondGraph, Kind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
@@ -124,7 +124,7 @@ pub fn magnitudes(graph: &BondGraph, run: &Run) -> BTreeMap<String, f64> {
 
 /// Audits a run that comes in parts: what a miss counts relative to is known when all of it was seen.
 pub struct Auditor {
-    graph: BondGraph,
+    graph: Arc<BondGraph>,
     columns: values::Columns,
     shares: Vec<constraints::Share>,
     quotients: laws::Quotients,
@@ -144,17 +144,21 @@ impl Auditor {
     /// Audits a run with these columns.
     fn of(graph: &BondGraph, run: &Run) -> Auditor {
         let known: BTreeMap<&str, usize> = run.names.iter().enumerate().map(|(i, name)| (&**name, i)).collect();
-        Auditor::new(graph, &mut |name| known.get(name).copied())
+        Auditor::new(&Arc::new(graph.clone()), &mut |name| known.get(name).copied())
     }
 
     /// Nothing has been seen yet. `column_of` tells the column that is recorded under a name.
-    pub fn new(graph: &BondGraph, column_of: &mut dyn FnMut(&str) -> Option<usize>) -> Auditor {
+    pub fn new(graph: &Arc<BondGraph>, column_of: &mut dyn FnMut(&str) -> Option<usize>) -> Auditor {
         let none = worst::Worst::default;
-        let mut x = graph.exprs.clone();
-        let shares = constraints::shares(graph, &mut x);
-        let quotients = laws::quotients(graph, &mut x);
-        let relations = drift::relations(graph, &mut x);
-        let graph = graph.with_exprs(x);
+        let mut graph = Arc::clone(graph);
+        let (mut shares, mut quotients, mut relations) = Default::default();
+        if makes_expressions(&graph) {
+            let mut x = graph.exprs.clone();
+            shares = constraints::shares(&graph, &mut x);
+            quotients = laws::quotients(&graph, &mut x);
+            relations = drift::relations(&graph, &mut x);
+            graph = Arc::new(graph.with_exprs(x));
+        }
         Auditor {
             columns: values::Columns::new(&graph, column_of),
             scales: scales::Scales::new(&graph),
@@ -230,6 +234,15 @@ impl Auditor {
             unchecked: self.unchecked.into_iter().collect(),
         }
     }
+}
+
+/// Whether there are constraints, two-ports or relations between speeds, of which an audit makes expressions of its own.
+fn makes_expressions(graph: &BondGraph) -> bool {
+    let is_junction = |kind: &Kind| matches!(kind, Kind::Zero | Kind::One);
+    let two_port = |kind: &Kind| kind.is_inner() && !is_junction(kind);
+    !graph.constraints.is_empty()
+        || !graph.signals.is_empty()
+        || graph.elements.values().any(|element| two_port(&element.kind))
 }
 
 impl fmt::Display for Finding {

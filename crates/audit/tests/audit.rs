@@ -210,7 +210,7 @@ fn a_run_in_parts_is_judged_as_the_whole() {
     columns.get_mut("spring.e").unwrap()[333] += 1e-5;
     let whole = check(&graph, &times, &columns);
     let names = names(&columns);
-    let mut auditor = Auditor::new(&graph, &mut |name| names.iter().position(|known| **known == *name));
+    let mut auditor = Auditor::new(&Arc::new(graph), &mut |name| names.iter().position(|known| **known == *name));
     let parameters = BTreeMap::from([("d".to_string(), 0.2)]);
     for (from, to) in [(0, 100), (99, 250), (249, 401)] {
         let part: Vec<&[f64]> = columns.values().map(|c| &c[from..to]).collect();

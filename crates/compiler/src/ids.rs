@@ -245,7 +245,8 @@ impl<K: Id, V: Clone> Extend<(K, V)> for Map<K, V> {
 
 impl<K: Id, V: Clone> FromIterator<(K, V)> for Map<K, V> {
     fn from_iter<I: IntoIterator<Item = (K, V)>>(pairs: I) -> Self {
-        let mut map = Map::new();
+        let pairs = pairs.into_iter();
+        let mut map = Map::with_capacity(pairs.size_hint().0);
         map.extend(pairs);
         map
     }

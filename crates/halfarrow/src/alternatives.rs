@@ -1,6 +1,7 @@
 //! The same model with other variables independent, derived while it runs.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{BondGraph, Kind, Named, Preference};
@@ -14,7 +15,7 @@ use halfarrow_exec as exec;
 /// The bond graph of which programs are made.
 #[derive(Debug)]
 pub(crate) struct Alternatives {
-    graph: BondGraph,
+    graph: Arc<BondGraph>,
     form: Form,
     /// How many states constants stand for, at most, in the branches of the start.
     conserved: usize,
@@ -23,12 +24,15 @@ pub(crate) struct Alternatives {
 impl Alternatives {
     /// Programs of `graph` that go on where one of these equations stops. What these have as states and the graph does not,
     /// sums of stored quantities, has a value in all of them.
-    pub fn new(graph: &BondGraph, first: &Equations) -> Alternatives {
-        let mut graph = graph.clone();
+    pub fn new(graph: &Arc<BondGraph>, first: &Equations) -> Alternatives {
+        let mut graph = Arc::clone(graph);
         for &(symbol, meaning) in &first.meanings {
             let Some(state) = first.states.iter().find(|s| s.symbol == symbol) else { continue };
-            let known = graph.outputs.iter().chain(&graph.lets).any(|named| named.name == state.name);
-            if let (false, Some(value)) = (known, graph.exprs.taken_from(&first.graph.exprs, meaning)) {
+            if graph.outputs.iter().chain(&graph.lets).any(|named| named.name == state.name) {
+                continue;
+            }
+            let graph = Arc::make_mut(&mut graph);
+            if let Some(value) = graph.exprs.taken_from(&first.graph.exprs, meaning) {
                 graph.lets.push(Named {
                     name: state.name.clone(),
                     value,
@@ -57,7 +61,7 @@ impl exec::Alternatives for Alternatives {
 
     fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
         let mut graph = match branches.is_empty() {
-            true => self.graph.clone(),
+            true => BondGraph::clone(&self.graph),
             false => self.graph.in_mode(&branches.iter().map(|&b| b as usize).collect::<Vec<_>>()),
         };
         let wanted = independent.iter().map(|&symbol| Preference {

@@ -2,7 +2,7 @@
 
 mod beside;
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::rc::Rc;
@@ -98,7 +98,7 @@ struct Book {
 
 impl<'a, M: Recording + Parameters> Audited<'a, M> {
     /// Audits what `model` computes; what it records stays what it is.
-    pub fn new(model: &'a mut M, graph: &BondGraph) -> Audited<'a, M> {
+    pub fn new(model: &'a mut M, graph: &Arc<BondGraph>) -> Audited<'a, M> {
         let observed = &model.program().observed;
         let asked = model.recorded().to_vec();
         let mut wanted = Wanted::new(observed, graph);
@@ -173,48 +173,75 @@ enum Origin {
 
 /// What the audit asks for of what can be recorded.
 struct Wanted<'p> {
-    /// Where each name that has a value stands among what can be recorded.
-    index_of: FxHashMap<&'p str, u32>,
-    /// What each of these is, and its column, if it has one.
-    known: Vec<(Origin, u32)>,
+    observed: &'p [Observed],
+    /// Where each name that has a value stands among these, made when one is not found in its turn.
+    index_of: OnceCell<FxHashMap<&'p str, u32>>,
+    /// Behind what was found last: among states, among other variables, and among those that are asked for after them.
+    next: [usize; 3],
+    /// What is a source or a signal.
+    special: FxHashMap<String, Origin>,
+    /// The column of each, if it has one.
+    columns: Vec<u32>,
     /// What is recorded for the audit, in the order of the columns.
     chosen: Vec<usize>,
     origins: Vec<Origin>,
 }
+
+/// How far a name is looked for behind the last one.
+const NEAR: usize = 6;
 
 /// The column of what was not asked for yet.
 const NONE: u32 = u32::MAX;
 
 impl<'p> Wanted<'p> {
     fn new(observed: &'p [Observed], graph: &BondGraph) -> Wanted<'p> {
-        let available = observed.iter().enumerate().filter(|(_, o)| o.value.is_ok());
-        let mut index_of = FxHashMap::with_capacity_and_hasher(observed.len(), Default::default());
-        index_of.extend(available.map(|(i, o)| (&*o.name, i as u32)));
-        let mut known = vec![(Origin::Other, NONE); observed.len()];
-        let mut is_a = |name: &str, origin: Origin| {
-            if let Some(&i) = index_of.get(name) {
-                known[i as usize].0 = origin;
-            }
-        };
-        graph.inputs.values().for_each(|i| is_a(&i.name, Origin::Signal));
-        graph.signals.values().for_each(|s| is_a(&s.name, Origin::Signal));
-        graph.held.values().for_each(|h| is_a(&h.name, Origin::Signal));
+        let mut special = FxHashMap::default();
+        let mut is_a = |name: String, origin: Origin| _ = special.insert(name, origin);
+        graph.inputs.values().for_each(|i| is_a(i.name.clone(), Origin::Signal));
+        graph.signals.values().for_each(|s| is_a(s.name.clone(), Origin::Signal));
+        graph.held.values().for_each(|h| is_a(h.name.clone(), Origin::Signal));
         graph.elements.values().for_each(|e| match e.kind {
-            Kind::EffortSource { .. } => is_a(&format!("{}.e", e.name), Origin::Source),
-            Kind::FlowSource { .. } => is_a(&format!("{}.f", e.name), Origin::Source),
+            Kind::EffortSource { .. } => is_a(format!("{}.e", e.name), Origin::Source),
+            Kind::FlowSource { .. } => is_a(format!("{}.f", e.name), Origin::Source),
             _ => {}
         });
-        Wanted { index_of, known, chosen: Vec::new(), origins: Vec::new() }
+        let variables = observed.iter().position(|o| !o.default).unwrap_or(observed.len());
+        Wanted {
+            observed,
+            index_of: OnceCell::new(),
+            next: [0, variables, variables],
+            special,
+            columns: vec![NONE; observed.len()],
+            chosen: Vec::new(),
+            origins: Vec::new(),
+        }
+    }
+
+    /// Where a name stands that has a value. Names are asked for in about the order in which they stand.
+    fn index_of(&mut self, name: &str) -> Option<usize> {
+        let all = self.observed;
+        let is_it = |i: &usize| *all[*i].name == *name && all[*i].value.is_ok();
+        for next in &mut self.next {
+            if let Some(found) = (*next..all.len().min(*next + NEAR)).find(is_it) {
+                *next = found + 1;
+                return Some(found);
+            }
+        }
+        let known = self.index_of.get_or_init(|| {
+            let available = all.iter().enumerate().filter(|(_, o)| o.value.is_ok());
+            available.map(|(i, o)| (&*o.name, i as u32)).collect()
+        });
+        Some(*known.get(name)? as usize)
     }
 
     /// The column of a variable, from now on if it had none; `None` if it has no value.
     fn column_of(&mut self, name: &str) -> Option<usize> {
-        let index = *self.index_of.get(name)? as usize;
-        let (origin, column) = &mut self.known[index];
+        let index = self.index_of(name)?;
+        let column = &mut self.columns[index];
         if *column == NONE {
             *column = self.chosen.len() as u32;
             self.chosen.push(index);
-            self.origins.push(*origin);
+            self.origins.push(self.special.get(name).copied().unwrap_or(Origin::Other));
         }
         Some(*column as usize)
     }

@@ -63,7 +63,11 @@ impl Model {
     pub fn compile(&self, form: Form) -> Result<Compiled, Error> {
         let equations = self.equations_in(form)?;
         let ready = match self.runs_alone(form) {
-            true => Ready::Explicit(Box::new(self.system(&equations)?)),
+            true => {
+                let planned = self.planned(&equations);
+                drop(equations);
+                Ready::Explicit(Box::new(self.coded(planned)?))
+            }
             false => {
                 let system = Box::new(self.form_system(&equations)?);
                 let explicit = equations.residuals.is_empty() && self.graph.set_valued.is_empty();
@@ -97,7 +101,7 @@ impl Model {
         };
         let inputs = shared.shares.iter().map(|share| share.index()).collect();
         let mut model = self.clone();
-        model.graph = shared.graph;
+        model.graph = Arc::new(shared.graph);
         let mut compiled = model.compile(form)?;
         compiled.shares = true;
         if let Ready::Explicit(system) = &mut compiled.ready {

@@ -12,6 +12,7 @@ pub use profile::Profile;
 use std::path::PathBuf;
 
 use faer::Mat;
+use halfarrow_compiler::bond_graph::BondGraph;
 use halfarrow_compiler::equations::Form;
 use halfarrow_trace::{Column, Trace};
 use serde::Serialize;
@@ -197,7 +198,7 @@ impl Model {
     /// # Errors
     /// A variable begins with no value.
     pub fn with_starts(&self, variables: &[&str]) -> Result<Model, Problem> {
-        let mut graph = self.graph.clone();
+        let mut graph = BondGraph::clone(&self.graph);
         for variable in variables {
             graph.make_start_parameter(variable).map_err(|reason| Problem::BadOption { reason })?;
         }

@@ -21,7 +21,7 @@ use crate::watch::{StageTime, Watch};
 /// A model without errors in its text, its names, its units and its bonds, and what was noticed in it.
 #[derive(Debug, Clone)]
 pub struct Model {
-    pub(crate) graph: BondGraph,
+    pub(crate) graph: Arc<BondGraph>,
     pub(crate) found: Found,
     pub(crate) watch: Watch,
     origin: Arc<Origin>,
@@ -72,7 +72,7 @@ impl Model {
         let watch = Watch::default();
         let read = watch.time("ast", || compile::read(text));
         let Reached { ir: graph, found } = watch.time("bond_graph", || compile::bond_graph_of(read, text))?;
-        Ok(Model { graph, found, watch, origin: Arc::new(Origin { source, files, overrides }) })
+        Ok(Model { graph: Arc::new(graph), found, watch, origin: Arc::new(Origin { source, files, overrides }) })
     }
 
     /// The same model with other values of parameters in the place of those that it has. Files are not read again.
@@ -88,7 +88,7 @@ impl Model {
 
     /// The same model with another graph.
     pub(crate) fn with_graph(&self, graph: BondGraph) -> Model {
-        Model { graph, ..self.clone() }
+        Model { graph: Arc::new(graph), ..self.clone() }
     }
 
     /// Its text, and the files that it read: the same model can be made of them elsewhere.

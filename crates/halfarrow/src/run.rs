@@ -533,8 +533,15 @@ impl Model {
     }
 
     pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {
-        let program = self.program_of(equations);
-        let alternatives = Arc::new(Alternatives::new(&self.graph, equations));
+        self.coded(self.planned(equations))
+    }
+
+    /// The program of equations, and what makes those of other modes: nothing else is needed of them for a run.
+    pub(crate) fn planned(&self, equations: &Equations) -> (Program, Arc<Alternatives>) {
+        (self.program_of(equations), Arc::new(Alternatives::new(&self.graph, equations)))
+    }
+
+    pub(crate) fn coded(&self, (program, alternatives): (Program, Arc<Alternatives>)) -> Result<exec::Model, Error> {
         let code = || exec::Model::of(Arc::new(exec::Compiled::new(program).with_alternatives(alternatives)));
         self.watch.time("code", code).map_err(|failure| self.stopped(failure))
     }

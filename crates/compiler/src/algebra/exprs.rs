@@ -112,6 +112,14 @@ impl Exprs {
         self.entries.len()
     }
 
+    /// Makes room for so many more symbols, and expressions of them.
+    pub fn reserve(&mut self, symbols: usize) {
+        let (entries, known) = (&self.entries, &self.symbols);
+        self.ids.reserve(symbols + symbols / 2, |&id| entries[id as usize].hash);
+        self.by_label.reserve(symbols, |&id| known[id as usize].hash);
+        self.of_symbols.reserve(symbols);
+    }
+
     /// Never: 0, 1 and -1 are always there.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()

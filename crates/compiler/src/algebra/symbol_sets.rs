@@ -17,6 +17,8 @@ const LARGEST: usize = 48;
 const SMALL: usize = 8;
 const EMPTY: SetId = SetId(0);
 const LARGE: SetId = SetId(1);
+/// Sets of one symbol are numbered by it, from here on.
+const SINGLES: u32 = 1 << 31;
 
 #[derive(Clone)]
 pub(super) struct SymbolSets {
@@ -26,12 +28,19 @@ pub(super) struct SymbolSets {
     ends: Vec<u32>,
     ids: HashTable<u32>,
     unions: FxHashMap<(SetId, SetId), SetId>,
+    /// The symbols up to the last that is a set alone: the members of such sets.
+    singles: Vec<Symbol>,
 }
 
 impl Default for SymbolSets {
     fn default() -> Self {
-        let mut sets =
-            SymbolSets { members: Vec::new(), ends: vec![0; 2], ids: HashTable::new(), unions: FxHashMap::default() };
+        let mut sets = SymbolSets {
+            members: Vec::new(),
+            ends: vec![0; 2],
+            ids: HashTable::new(),
+            unions: FxHashMap::default(),
+            singles: Vec::new(),
+        };
         sets.ids.insert_unique(hash_of(&[]), EMPTY.0, |_| hash_of(&[]));
         sets
     }
@@ -39,16 +48,28 @@ impl Default for SymbolSets {
 
 impl SymbolSets {
     fn get(&self, id: SetId) -> Option<&[Symbol]> {
-        (id != LARGE).then(|| members(&self.members, &self.ends, id.0))
+        match id {
+            LARGE => None,
+            SetId(single @ SINGLES..) => self.singles.get((single - SINGLES) as usize).map(std::slice::from_ref),
+            SetId(id) => Some(members(&self.members, &self.ends, id)),
+        }
     }
 
     fn len(&self, id: SetId) -> usize {
-        members(&self.members, &self.ends, id.0).len()
+        self.get(id).map_or(0, <[Symbol]>::len)
+    }
+
+    fn single(&mut self, symbol: Symbol) -> SetId {
+        let known = self.singles.len() as u32;
+        self.singles.extend((known..symbol.0 + 1).map(Symbol));
+        SetId(SINGLES + symbol.0)
     }
 
     fn intern(&mut self, symbols: &[Symbol]) -> SetId {
-        if symbols.len() > LARGEST {
-            return LARGE;
+        match symbols {
+            &[symbol] => return self.single(symbol),
+            _ if symbols.len() > LARGEST => return LARGE,
+            _ => {}
         }
         let SymbolSets { members: all, ends, ids, .. } = self;
         let hash = hash_of(symbols);
@@ -137,7 +158,7 @@ impl IntoIterator for Symbols {
 impl Exprs {
     pub(super) fn symbols_of_node(&mut self, node: &Node) -> SetId {
         if let Node::Symbol(s) = node {
-            return self.sets.intern(&[*s]);
+            return self.sets.single(*s);
         }
         let (entries, sets) = (&self.entries, &mut self.sets);
         let of = |e: Expr| entries[e.0 as usize].symbols;
@@ -247,17 +268,24 @@ impl Exprs {
 /// Up to so many entries are looked for one by one.
 pub(super) const FEW: usize = 24;
 
-/// Entries that were met: few in a row, many in a table.
+/// From so many entries on each has a bit.
+const MANY: usize = 4096;
+
+/// Entries that were met: few in a row, more in a table, a part of the pool bit by bit.
 #[derive(Default)]
 struct Seen {
     few: SmallVec<[Expr; FEW]>,
-    many: FxHashSet<Expr>,
+    some: FxHashSet<Expr>,
+    bits: Vec<u64>,
 }
 
 impl Seen {
     /// Whether it is new.
     fn insert(&mut self, e: Expr) -> bool {
-        if self.many.is_empty() {
+        if !self.bits.is_empty() {
+            return self.set(e);
+        }
+        if self.some.is_empty() {
             if self.few.contains(&e) {
                 return false;
             }
@@ -265,14 +293,49 @@ impl Seen {
                 self.few.push(e);
                 return true;
             }
-            self.many.extend(self.few.drain(..));
+            self.some.extend(self.few.drain(..));
         }
-        self.many.insert(e)
+        if self.some.len() < MANY {
+            return self.some.insert(e);
+        }
+        std::mem::take(&mut self.some).into_iter().for_each(|e| _ = self.set(e));
+        self.set(e)
+    }
+
+    fn set(&mut self, e: Expr) -> bool {
+        let (word, bit) = (e.0 as usize / 64, 1 << (e.0 % 64));
+        if self.bits.len() <= word {
+            self.bits.resize(word + 1, 0);
+        }
+        let new = self.bits[word] & bit == 0;
+        self.bits[word] |= bit;
+        new
     }
 
     fn into_order(self) -> SmallVec<[Expr; FEW]> {
-        let mut order = if self.many.is_empty() { self.few } else { self.many.into_iter().collect() };
+        if !self.bits.is_empty() {
+            let bits = self.bits.iter().zip(0u32..).flat_map(|(&word, i)| {
+                (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| Expr(64 * i + bit))
+            });
+            return bits.collect();
+        }
+        let mut order = if self.some.is_empty() { self.few } else { self.some.into_iter().collect() };
         order.sort_unstable();
         order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Expr, FEW, MANY, Seen};
+
+    #[test]
+    fn entries_are_met_once_and_put_in_order_however_many_there_are() {
+        for count in [FEW, MANY, 3 * MANY].map(|n| n as u32) {
+            let mut seen = Seen::default();
+            let new = (0..3 * count).filter(|i| seen.insert(Expr(i * 7 % count))).count();
+            assert_eq!(new as u32, count);
+            assert!(seen.into_order().iter().map(|e| e.0).eq(0..count));
+        }
     }
 }

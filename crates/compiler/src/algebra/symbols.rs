@@ -2,6 +2,7 @@
 
 use super::exprs::Exprs;
 use super::fingerprint::mix;
+use super::grown::{GrownTexts, Place, place};
 use super::node::{Expr, Facts, Node, Symbol};
 
 /// What a symbol is, seen from the one that it is made of.
@@ -51,37 +52,22 @@ pub(super) struct SymbolEntry {
     facts: Facts,
 }
 
-/// From where to where something stands in a text.
-type Place = (u32, u32);
-
-/// What symbols are called, one after the other.
+/// What symbols are called.
 #[derive(Clone, Default)]
 pub(super) struct Texts {
-    labels: String,
+    labels: GrownTexts,
     /// Labels with their numbers padded, so that `q2` comes before `q10`.
-    orders: Vec<u8>,
+    orders: GrownTexts,
 }
 
 impl Texts {
     fn push(&mut self, label: &str) -> Place {
-        let start = place(self.labels.len());
-        self.labels.push_str(label);
-        (start, place(self.labels.len()))
+        self.labels.add(label.len(), |out| out.push_str(label))
     }
 
     fn push_order(&mut self, label: &str) -> Place {
-        let start = place(self.orders.len());
-        push_natural_order(&mut self.orders, label);
-        (start, place(self.orders.len()))
+        self.orders.add(3 * label.len(), |out| push_natural_order(out, label))
     }
-
-    fn at(&self, (start, end): Place) -> &str {
-        &self.labels[start as usize..end as usize]
-    }
-}
-
-fn place(length: usize) -> u32 {
-    u32::try_from(length).expect("names of less than 4 GiB")
 }
 
 /// A name with the sign of its time derivatives: `phi` and 1 are `phi'`.
@@ -104,8 +90,9 @@ impl Exprs {
 
     /// A new quantity of that name, or of that name with the first free number from 2 behind it.
     pub fn fresh(&mut self, name: &str, facts: Facts) -> Symbol {
-        if self.find_symbol(name).is_none() {
-            return self.add_symbol(name, name, SymbolKind::Own, facts);
+        let hash = hash_label(name);
+        if self.find_hashed(hash, name).is_none() {
+            return self.add_hashed(hash, (name, name), SymbolKind::Own, facts);
         }
         let name = self.free_name(name);
         self.add_symbol(&name, &name, SymbolKind::Own, facts)
@@ -172,6 +159,10 @@ impl Exprs {
     }
 
     fn add_symbol(&mut self, label: &str, name: &str, kind: SymbolKind, facts: Facts) -> Symbol {
+        self.add_hashed(hash_label(label), (label, name), kind, facts)
+    }
+
+    fn add_hashed(&mut self, hash: u64, (label, name): (&str, &str), kind: SymbolKind, facts: Facts) -> Symbol {
         let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
         let at = self.texts.push(label);
         let name = match label.strip_prefix(name) {
@@ -179,7 +170,6 @@ impl Exprs {
             None => self.texts.push(name),
         };
         let order = self.texts.push_order(label);
-        let hash = hash_label(label);
         self.symbols.push(SymbolEntry { label: at, name, order, hash, kind, facts });
         self.of_symbols.push(None);
         let symbols = &self.symbols;
@@ -192,7 +182,11 @@ impl Exprs {
 
     /// The symbol of that name, if there is one; of those that share a name the first.
     pub fn find_symbol(&self, name: &str) -> Option<Symbol> {
-        let found = self.by_label.find(hash_label(name), |&id| self.label(Symbol(id)) == name);
+        self.find_hashed(hash_label(name), name)
+    }
+
+    fn find_hashed(&self, hash: u64, name: &str) -> Option<Symbol> {
+        let found = self.by_label.find(hash, |&id| self.label(Symbol(id)) == name);
         found.map(|&id| Symbol(id))
     }
 
@@ -227,12 +221,12 @@ impl Exprs {
 
     /// What people call a symbol. Twins have one name, and what acts on a kept variable may have that of another.
     pub fn name(&self, symbol: Symbol) -> &str {
-        self.texts.at(self.symbols[symbol.0 as usize].name)
+        self.texts.labels.at(self.symbols[symbol.0 as usize].name)
     }
 
     /// The name with marks that tell it apart from all others.
     pub fn label(&self, symbol: Symbol) -> &str {
-        self.texts.at(self.symbols[symbol.0 as usize].label)
+        self.texts.labels.at(self.symbols[symbol.0 as usize].label)
     }
 
     /// What is known of a symbol.
@@ -257,8 +251,7 @@ impl Exprs {
     }
 
     pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
-        let (start, end) = self.symbols[symbol.0 as usize].order;
-        &self.texts.orders[start as usize..end as usize]
+        self.texts.orders.at(self.symbols[symbol.0 as usize].order).as_bytes()
     }
 }
 
@@ -266,18 +259,18 @@ fn hash_label(label: &str) -> u64 {
     label.bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
 }
 
-fn push_natural_order(order: &mut Vec<u8>, name: &str) {
-    let mut rest = name.as_bytes();
-    while let Some(&first) = rest.first() {
-        if !first.is_ascii_digit() {
-            order.push(first);
-            rest = &rest[1..];
-            continue;
+fn push_natural_order(order: &mut String, name: &str) {
+    let mut rest = name;
+    while !rest.is_empty() {
+        let words = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        order.push_str(&rest[..words]);
+        rest = &rest[words..];
+        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+        if digits > 0 {
+            // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
+            order.extend(['0', char::from(digits.min(127) as u8)]);
+            order.push_str(&rest[..digits]);
+            rest = &rest[digits..];
         }
-        let len = rest.iter().take_while(|b| b.is_ascii_digit()).count();
-        // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
-        order.extend([b'0', len.min(255) as u8]);
-        order.extend_from_slice(&rest[..len]);
-        rest = &rest[len..];
     }
 }

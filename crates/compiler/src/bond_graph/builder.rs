@@ -229,6 +229,7 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// A builder that knows the symbols of all bonds.
     pub fn new(flat: &'f Flat<'a>, wiring: &'f Wiring, sources: &'f Sources, files: &'f dyn Files) -> Self {
         let mut exprs = Exprs::default();
+        exprs.reserve(2 * wiring.wires.len() + flat.parts.len());
         let time = exprs.symbol("t", Facts::default());
         let mut b = Builder {
             flat,

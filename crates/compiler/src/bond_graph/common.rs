@@ -1,6 +1,8 @@
 //! Which variable stands for the common one of a junction.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+
+use smallvec::SmallVec;
 
 use super::builder::{Builder, Pair};
 use super::constraint::Relation;
@@ -11,6 +13,9 @@ use super::{Bond, BondGraph, BondId, ElementId, Kind, Meaning};
 use crate::algebra::{Facts, Symbol};
 use crate::ids::{Id, Map};
 
+/// The 1-junction and the 0-junction that each bond stands for.
+type Taken = Vec<[Option<u32>; 2]>;
+
 /// The bond of each junction whose variable stands for the common one, by part: at a 1 that of an `I`, at a 0 that of a
 /// `C`, else one inside the junction structure, else the first. `None` for other parts.
 ///
@@ -19,23 +24,23 @@ use crate::ids::{Id, Map};
 /// junctions touches nothing else two of them are left with one bond.
 pub(super) fn representatives(flat: &Flat<'_>, wiring: &Wiring) -> Vec<Option<usize>> {
     let parts = 0..flat.parts.len();
-    let candidates: Vec<Vec<usize>> = parts.clone().map(|part| candidates(flat, wiring, part)).collect();
-    let mut taken: BTreeMap<(usize, bool), usize> = BTreeMap::new();
+    let candidates: Vec<SmallVec<[usize; 2]>> = parts.clone().map(|part| candidates(flat, wiring, part)).collect();
+    let mut taken: Taken = vec![[None; 2]; wiring.wires.len()];
     for junction in parts {
         take(flat, &candidates, junction, &mut taken, &mut BTreeSet::new());
     }
     let mut common: Vec<Option<usize>> = candidates.iter().map(|wires| wires.first().copied()).collect();
-    for (&(wire, _), &junction) in &taken {
-        common[junction] = Some(wire);
+    for (wire, junctions) in taken.iter().enumerate() {
+        junctions.iter().flatten().for_each(|&junction| common[junction as usize] = Some(wire));
     }
     common
 }
 
 /// The bonds of a junction, the most welcome first.
-fn candidates(flat: &Flat<'_>, wiring: &Wiring, junction: usize) -> Vec<usize> {
+fn candidates(flat: &Flat<'_>, wiring: &Wiring, junction: usize) -> SmallVec<[usize; 2]> {
     let word = flat.parts[junction].word;
     if !word.is_junction() {
-        return Vec::new();
+        return SmallVec::new();
     }
     let favourite = if word == Word::One { Word::I } else { Word::C };
     let rank = |wire: &usize| {
@@ -47,7 +52,7 @@ fn candidates(flat: &Flat<'_>, wiring: &Wiring, junction: usize) -> Vec<usize> {
             _ => 2,
         }
     };
-    let mut wires: Vec<usize> = wiring.ports[junction].iter().flatten().map(|(wire, _)| *wire).collect();
+    let mut wires: SmallVec<[usize; 2]> = wiring.ports[junction].iter().flatten().map(|(wire, _)| *wire).collect();
     wires.sort_by_key(rank);
     wires
 }
@@ -55,19 +60,19 @@ fn candidates(flat: &Flat<'_>, wiring: &Wiring, junction: usize) -> Vec<usize> {
 /// Gives a junction a bond that no other of its kind has, if need be by giving others another one.
 fn take(
     flat: &Flat<'_>,
-    candidates: &[Vec<usize>],
+    candidates: &[SmallVec<[usize; 2]>],
     junction: usize,
-    taken: &mut BTreeMap<(usize, bool), usize>,
+    taken: &mut Taken,
     tried: &mut BTreeSet<usize>,
 ) -> bool {
-    let zero = flat.parts[junction].word == Word::Zero;
+    let zero = usize::from(flat.parts[junction].word == Word::Zero);
     for &wire in &candidates[junction] {
         if !tried.insert(wire) {
             continue;
         }
-        let holder = taken.get(&(wire, zero)).copied();
-        if holder.is_none_or(|other| take(flat, candidates, other, taken, tried)) {
-            taken.insert((wire, zero), junction);
+        let holder = taken[wire][zero];
+        if holder.is_none_or(|other| take(flat, candidates, other as usize, taken, tried)) {
+            taken[wire][zero] = Some(junction as u32);
             return true;
         }
     }

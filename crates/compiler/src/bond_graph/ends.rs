@@ -1,5 +1,7 @@
 //! What the ends of bonds are, when all nodes are known.
 
+use smallvec::{SmallVec, smallvec};
+
 use super::flatten::{At, Drawn, End, Flat, full_name};
 use super::multibonds::{Width, part_name, strand_name};
 use super::scope::{Here, Node, ScopeId, no_indices};
@@ -11,7 +13,7 @@ use crate::span::Span;
 
 /// One end of a bond, or of several side by side.
 struct Ends {
-    ends: Vec<End>,
+    ends: SmallVec<[End; 1]>,
     /// Whether it is wide, even where it has one bond.
     wide: bool,
     span: Span,
@@ -21,7 +23,7 @@ struct Ends {
 
 impl Ends {
     fn one(at: At, span: Span) -> Ends {
-        Ends { ends: vec![End { at, span }], wide: false, span, frame: None }
+        Ends { ends: smallvec![End { at, span }], wide: false, span, frame: None }
     }
 
     fn is_broken(&self) -> bool {
@@ -34,6 +36,7 @@ impl<'a> Flat<'a> {
     pub fn draw_bonds(&mut self) {
         let mut chains = std::mem::take(&mut self.chains);
         chains.sort_by_key(|(here, _, _)| here.scope);
+        self.drawn.reserve(chains.iter().map(|(_, chain, _)| chain.bonds.len()).sum());
         for (here, chain, pseudo) in chains {
             let before = self.faults.len();
             self.draw_chain(here, chain, pseudo);
@@ -160,7 +163,7 @@ impl<'a> Flat<'a> {
                 wide(self.parts[part].side(pointed_at).map(|port| At::Part(part, Some(port))).collect(), None)
             }
             Node::Instance(scope) if self.frames.contains_key(&scope) => {
-                let ends = self.bonds_of_frame(here, scope, span);
+                let ends = self.bonds_of_frame(here, scope, span).into();
                 Ends { ends, wide: true, span, frame: Some(scope) }
             }
             Node::Instance(inner) => match self.usual_frame(inner, pointed_at) {

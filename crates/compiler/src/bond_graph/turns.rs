@@ -1,6 +1,6 @@
 //! Statements that are repeated, or chosen.
 
-use super::flatten::Flat;
+use super::flatten::{Flat, MAX_PARTS};
 use super::scope::Here;
 use crate::ast::{self, StatementKind};
 use crate::diagnostic::{Diagnostic, codes};
@@ -26,7 +26,14 @@ impl<'a> Flat<'a> {
             self.too_large(l.from.span.to(l.to.span));
             return;
         };
-        for value in values {
+        let (turns, parts, chains) = (values.clone().count(), self.parts.len(), self.chains.len());
+        for (at, value) in values.enumerate() {
+            if at == 1 {
+                // Most turns make as much as the first.
+                let others = |made: usize| (made * (turns - 1)).min(MAX_PARTS);
+                self.parts.reserve(others(self.parts.len() - parts));
+                self.chains.reserve(others(self.chains.len() - chains));
+            }
             let turn = self.repeats.turn(&l.variable, value, here);
             let before = self.faults.len();
             self.fill(Here { turn, ..here }, &l.body, pseudo, imported);

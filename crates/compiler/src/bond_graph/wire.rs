@@ -1,7 +1,9 @@
 //! From drawn bonds to bonds between ports of elements: ports of components vanish, every port gets its bond.
 
 use super::faults::Faults;
-use super::flatten::{At, Drawn, End, Flat, Part, Word};
+use smallvec::{SmallVec, smallvec};
+
+use super::flatten::{At, End, Flat, Part, Word};
 use super::multibonds::Width;
 use super::scope::{Here, Names};
 use crate::diagnostic::{Diagnostic, codes};
@@ -41,6 +43,9 @@ pub(super) struct Wiring {
     crowded_parts: Vec<usize>,
 }
 
+/// The drawn bonds that make one bond.
+type Chain = SmallVec<[usize; 2]>;
+
 /// A side of a joint: the drawn bond there, and whether the bond starts at the joint.
 type Side = Option<(usize, bool)>;
 
@@ -56,6 +61,7 @@ struct Sides {
 /// Connects the drawn bonds of a model.
 pub(super) fn wire(flat: &Flat<'_>) -> Wiring {
     let mut wiring = Wiring {
+        wires: Vec::with_capacity(flat.drawn.len()),
         ports: flat.parts.iter().map(|p| vec![None; slots(p)]).collect(),
         of_drawn: vec![None; flat.drawn.len()],
         of_joint: vec![None; flat.joints.len()],
@@ -187,7 +193,7 @@ impl Wiring {
 
     /// Joins the drawn bonds that meet at ports of components to one bond.
     fn join(&mut self, flat: &Flat<'_>, sides: &[Sides], i: usize, done: &mut [bool], touched: &mut [bool]) {
-        let mut chain = vec![i];
+        let mut chain: Chain = smallvec![i];
         let from = follow(flat, sides, i, true, &mut chain);
         let to = follow(flat, sides, i, false, &mut chain);
         for &piece in &chain {
@@ -399,14 +405,13 @@ impl Wiring {
 /// The bond that pieces make: it has the place of the first, and the first name among them.
 fn wire_of(flat: &Flat<'_>, chain: &[usize], from: (usize, usize), to: (usize, usize), i: usize) -> Wire {
     let drawn = &flat.drawn[i];
-    let mut pieces: Vec<&Drawn> = chain.iter().map(|&c| &flat.drawn[c]).collect();
-    pieces.sort_by_key(|d| d.span);
-    let name = chain.iter().map(|&c| flat.drawn[c].name.as_str()).find(|n| !n.is_empty());
-    Wire { from, to, name: name.unwrap_or("").to_string(), pseudo: pieces.iter().any(|d| d.pseudo), span: drawn.span }
+    let pieces = || chain.iter().map(|&c| &flat.drawn[c]);
+    let name = pieces().map(|d| d.name.as_str()).find(|n| !n.is_empty());
+    Wire { from, to, name: name.unwrap_or("").to_string(), pseudo: pieces().any(|d| d.pseudo), span: drawn.span }
 }
 
 /// The end of a bond at an element, through the ports of components; `None` if it ends nowhere.
-fn follow(flat: &Flat<'_>, sides: &[Sides], start: usize, backward: bool, chain: &mut Vec<usize>) -> Option<End> {
+fn follow(flat: &Flat<'_>, sides: &[Sides], start: usize, backward: bool, chain: &mut Chain) -> Option<End> {
     let mut at = start;
     loop {
         let drawn = &flat.drawn[at];

@@ -2,7 +2,7 @@
 
 use super::ports::{Virtual, imposes_effort};
 use super::two_ports::{self, Given};
-use super::{Combination, PortState, Role};
+use super::{Combination, PortState, Role, Terms};
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, ElementId, Kind, PortCausality, PortRef};
 
@@ -39,18 +39,18 @@ pub fn definitions(
                 let common = |i: usize| if zero { pair(i).0 } else { pair(i).1 };
                 let summed = |i: usize| if zero { pair(i).1 } else { pair(i).0 };
                 if let Some(v) = kept.iter().find(|v| v.junction == element) {
-                    let all_common = (0..ports.len()).map(|i| (common(i), Combination(vec![(v.speed, one)])));
+                    let all_common = (0..ports.len()).map(|i| (common(i), Combination::of(v.speed, one)));
                     all.extend(all_common);
                     let sign = |i: usize| if ports[i].inward { 1 } else { -1 };
                     let mut sum: Vec<(Symbol, Expr)> = (0..ports.len()).map(|i| (summed(i), x.int(sign(i)))).collect();
                     sum.sort_by_key(|t| t.0);
-                    all.push((v.reaction, Combination(sum)));
+                    all.push((v.reaction, Combination(sum.into())));
                     continue;
                 }
                 let strong = (0..ports.len()).find(|&i| at(i) == zero).expect("one bond determines a junction");
-                let mut sum = Vec::with_capacity(ports.len() - 1);
+                let mut sum = Terms::with_capacity(ports.len() - 1);
                 for i in (0..ports.len()).filter(|&i| i != strong) {
-                    all.push((common(i), Combination(vec![(common(strong), one)])));
+                    all.push((common(i), Combination::of(common(strong), one)));
                     let same = ports[i].inward == ports[strong].inward;
                     sum.push((summed(i), x.int(if same { -1 } else { 1 })));
                 }
@@ -73,8 +73,8 @@ pub fn definitions(
                     (false, false) => [(e_in, f_out), (e_out, f_in)],
                     (false, true) => [(f_out, e_in), (f_in, e_out)],
                 };
-                all.push((a, Combination(vec![(b, factor)])));
-                all.push((c, Combination(vec![(d, factor)])));
+                all.push((a, Combination::of(b, factor)));
+                all.push((c, Combination::of(d, factor)));
             }
             Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
                 let rows = graph.elements[element].kind.two_port_rows();
@@ -107,7 +107,7 @@ pub fn definitions(
                         None => continue,
                     };
                     sum.sort_by_key(|t| t.0);
-                    all.push((set, Combination(sum)));
+                    all.push((set, Combination(sum.into())));
                 }
             }
             _ => {}

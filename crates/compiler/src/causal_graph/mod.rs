@@ -27,6 +27,8 @@ mod verify;
 
 use std::collections::BTreeMap;
 
+use smallvec::{SmallVec, smallvec};
+
 use crate::algebra::{Expr, Exprs, ONE, Symbol};
 use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
 use crate::ids::{Map, Table};
@@ -139,7 +141,10 @@ pub enum Role {
 
 /// A linear combination of variables: sorted by symbol, no zero coefficient.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Combination(pub Vec<(Symbol, Expr)>);
+pub struct Combination(pub Terms);
+
+/// Terms of a combination, two of them held in place.
+pub type Terms = SmallVec<[(Symbol, Expr); 2]>;
 
 impl Ports {
     /// The state of a port.
@@ -150,7 +155,7 @@ impl Ports {
     /// A variable as a combination of inputs alone; `known` keeps what has been worked out.
     pub fn resolve(&self, x: &mut Exprs, symbol: Symbol, known: &mut Map<Symbol, Combination>) -> Combination {
         self.resolve_into(x, symbol, known);
-        known.get(&symbol).cloned().unwrap_or_else(|| Combination(vec![(symbol, ONE)]))
+        known.get(&symbol).cloned().unwrap_or_else(|| Combination::of(symbol, ONE))
     }
 
     /// Resolves a variable, and all variables in its definition, into combinations of inputs alone, stored in `known`. An
@@ -188,9 +193,14 @@ impl Ports {
 }
 
 impl Combination {
+    /// One term.
+    pub fn of(symbol: Symbol, coefficient: Expr) -> Combination {
+        Combination(smallvec![(symbol, coefficient)])
+    }
+
     /// The combination as an expression.
     pub fn expr(&self, x: &mut Exprs) -> Expr {
-        let terms: Vec<Expr> = self
+        let terms: SmallVec<[Expr; 4]> = self
             .0
             .iter()
             .map(|&(s, c)| {
@@ -208,13 +218,9 @@ impl Combination {
 
     /// The combination with symbols replaced by those that they are aliases of, like terms collected.
     pub(crate) fn renamed(&self, x: &mut Exprs, other: &impl Fn(Symbol) -> Symbol) -> Combination {
-        let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
-        for &(s, c) in &self.0 {
-            let s = other(s);
-            let value = sum.get(&s).map_or(c, |&old| x.add(&[old, c]));
-            sum.insert(s, value);
-        }
-        Combination(sum.into_iter().collect())
+        let mut sum = Sum::default();
+        self.0.iter().for_each(|&(s, c)| sum.add(x, other(s), c));
+        sum.combination()
     }
 
     /// The combination with known combinations substituted for their symbols.
@@ -233,23 +239,54 @@ impl Combination {
         {
             return row.clone();
         }
-        let mut sum: BTreeMap<Symbol, Expr> = BTreeMap::new();
+        let mut sum = Sum::default();
         for &(s, c) in &self.0 {
             let own = [(s, c)];
             let inner = known(s);
             for &(t, e) in inner.map_or(&own[..], |k| &k.0) {
                 let product = if inner.is_some() { x.mul(&[c, e]) } else { e };
-                let value = sum.get(&t).map_or(product, |&old| x.add(&[old, product]));
-                sum.insert(t, value);
+                sum.add(x, t, product);
             }
         }
-        for e in sum.values_mut() {
+        let mut sum = sum.combination();
+        for (_, e) in &mut sum.0 {
             if x.is_number(*e).is_none() {
                 *e = x.bounded(*e);
             }
         }
-        sum.retain(|&s, e| stays(x, (s, *e), undetermined));
-        Combination(sum.into_iter().collect())
+        sum.0.retain(|term| stays(x, *term, undetermined));
+        sum
+    }
+}
+
+/// Up to so many terms of a sum stand in a row.
+const FEW: usize = 16;
+
+/// A sum of terms, those of one symbol added up: few in a row, many in a tree.
+#[derive(Default)]
+struct Sum {
+    few: Terms,
+    many: BTreeMap<Symbol, Expr>,
+}
+
+impl Sum {
+    fn add(&mut self, x: &mut Exprs, symbol: Symbol, term: Expr) {
+        if self.few.len() == FEW {
+            self.many.extend(self.few.drain(..));
+        }
+        if !self.many.is_empty() {
+            let value = self.many.get(&symbol).map_or(term, |&old| x.add(&[old, term]));
+            self.many.insert(symbol, value);
+            return;
+        }
+        match self.few.binary_search_by_key(&symbol, |t| t.0) {
+            Ok(at) => self.few[at].1 = x.add(&[self.few[at].1, term]),
+            Err(at) => self.few.insert(at, (symbol, term)),
+        }
+    }
+
+    fn combination(self) -> Combination {
+        Combination(if self.many.is_empty() { self.few } else { self.many.into_iter().collect() })
     }
 }
 

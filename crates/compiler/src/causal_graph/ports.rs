@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::matched::{Block, BlockRows, block_rows, matched_rows};
-use super::{Combination, LoopRows, PortState, Role};
+use super::{Combination, LoopRows, PortState, Role, Terms};
 use crate::algebra::{
     Assumptions, Coefficients, Elimination, Eliminator, Expr, Exprs, NumericPoint, ONE, SparseRow, Symbol,
     back_substitute, eliminate,
@@ -374,7 +374,7 @@ impl Net {
     }
 
     fn combination(&self, row: &[(usize, Expr)]) -> Combination {
-        let mut terms: Vec<(Symbol, Expr)> = row.iter().map(|&(c, e)| (self.symbols[c], e)).collect();
+        let mut terms: Terms = row.iter().map(|&(c, e)| (self.symbols[c], e)).collect();
         terms.sort_by_key(|t| t.0);
         Combination(terms)
     }

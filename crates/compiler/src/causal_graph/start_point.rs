@@ -15,7 +15,7 @@ pub(crate) fn start_point(x: &Exprs, graph: &BondGraph) -> NumericPoint {
 
 /// The same by symbol.
 pub(super) fn start_values(x: &Exprs, graph: &BondGraph) -> Map<Symbol, f64> {
-    let mut values: Map<Symbol, f64> = Map::new();
+    let mut values: Map<Symbol, f64> = Map::with_capacity(x.symbol_count());
     for parameter in graph.parameters.values() {
         values.insert(parameter.symbol, x.given_value(parameter.value).unwrap_or(1.0));
     }

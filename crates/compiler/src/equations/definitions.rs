@@ -68,10 +68,11 @@ impl<'a> Definitions<'a> {
     /// Nothing defined yet.
     pub fn new(mut x: Exprs, graph: &'a BondGraph) -> Self {
         x.forget_rates();
+        let of = Map::with_capacity(x.symbol_count() + x.symbol_count() / 4);
         Definitions {
             x,
             graph,
-            of: Map::new(),
+            of,
             written: Map::new(),
             states: Map::new(),
             stored: Map::new(),

@@ -178,7 +178,8 @@ fn order_equations(
         Form::Minimal => exchanges(&mut assembled, truth, &conserved),
         _ => Exchanges::default(),
     };
-    let Assembled { mut d, states, .. } = assembled;
+    let Assembled { mut d, states, rows, balances, .. } = assembled;
+    drop((rows, balances));
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {

@@ -265,7 +265,7 @@ impl Sum<'_, '_> {
             let assembled = &mut *self.assembled;
             let row = match assembled.rows.of(&mut assembled.d.x, variable) {
                 Some(row) => row.clone(),
-                None if known => Combination(vec![(variable, ONE)]),
+                None if known => Combination::of(variable, ONE),
                 None if assembled.d.of.get(&variable).is_some_and(|of| !varies(&assembled.d, of.expr())) => continue,
                 None => return None,
             };

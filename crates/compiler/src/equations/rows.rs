@@ -42,7 +42,7 @@ impl<'a> Rows<'a> {
         let givers = ports.ports.iter().map(|p| (p.input, p)).collect();
         // Where two elements share a bond, what one gives is what the other takes.
         let shared = ports.ports.iter().map(|p| p.output).filter(|s| !ports.definitions.contains_key(s));
-        let mut known: Map<Symbol, Combination> = shared.map(|s| (s, Combination(vec![(s, ONE)]))).collect();
+        let mut known: Map<Symbol, Combination> = shared.map(|s| (s, Combination::of(s, ONE))).collect();
         known.extend(zero.iter().map(|&s| (s, Combination::default())));
         let one = causal.graph.exprs.residue(ONE);
         let residues = known.iter().map(|(&s, row)| (s, row.0.iter().map(|t| (t.0, one)).collect())).collect();
@@ -206,10 +206,10 @@ impl<'a> Rows<'a> {
             along.insert(symbol, row);
         }
         let needed: BTreeSet<Symbol> = needed.into_iter().map(|n| n.0).collect();
-        let mut all: Map<Symbol, Combination> = Map::new();
+        let mut all: Map<Symbol, Combination> = Map::with_capacity(x.symbol_count());
         for (&symbol, row) in &ports.definitions {
             let own = Combination(row.0.iter().filter(|t| !self.zero.contains(&t.0)).copied().collect());
-            let row = match (needed.contains(&symbol), as_short.contains(&symbol)) {
+            let row = match (needed.contains(&symbol), as_short.contains_key(&symbol)) {
                 (true, _) => match along.remove(&symbol) {
                     Some(row) => row,
                     None => self.of(x, symbol).expect("it is defined").clone(),
@@ -221,30 +221,32 @@ impl<'a> Rows<'a> {
         }
         let independent = ports.ports.iter().filter(|p| p.role == Role::Independent);
         self.cancelling = needed;
-        for_junctions(&mut all, &independent.map(|p| p.output).collect());
+        self.short = Map::new();
+        for_junctions(&mut all, &independent.map(|p| (p.output, ())).collect());
         let last = |mut symbol: Symbol| {
             while let Some(&[(other, ONE)]) = all.get(&symbol).map(|row| &row.0[..]) {
                 symbol = other;
             }
             symbol
         };
-        let renamed = all.iter().map(|(&symbol, row)| (symbol, row.renamed(x, &last)));
-        renamed.collect()
+        let mut renamed = Vec::with_capacity(all.len());
+        renamed.extend(all.iter().map(|(&symbol, row)| (symbol, row.renamed(x, &last))));
+        renamed
     }
 }
 
 /// Where a variable of a junction is nothing but what a storage takes, the junction's is defined and the storage takes it:
 /// rates of states are then read by nobody.
-fn for_junctions(all: &mut Map<Symbol, Combination>, outputs: &BTreeSet<Symbol>) {
+fn for_junctions(all: &mut Map<Symbol, Combination>, outputs: &Map<Symbol, ()>) {
     let name_of = |(&symbol, row): (&Symbol, &Combination)| match row.0[..] {
-        [(output, ONE)] if outputs.contains(&output) && !outputs.contains(&symbol) => Some((output, symbol)),
+        [(output, ONE)] if outputs.contains_key(&output) && !outputs.contains_key(&symbol) => Some((output, symbol)),
         _ => None,
     };
-    let names: BTreeMap<Symbol, Symbol> = all.iter().rev().filter_map(name_of).collect();
-    for (output, symbol) in names {
+    let names: Map<Symbol, Symbol> = all.iter().rev().filter_map(name_of).collect();
+    for (&output, &symbol) in &names {
         if let Some(row) = all.remove(&output) {
             all.insert(symbol, row);
-            all.insert(output, Combination(vec![(symbol, ONE)]));
+            all.insert(output, Combination::of(symbol, ONE));
         }
     }
 }
@@ -300,7 +302,7 @@ struct WrittenOut {
     needed: Vec<(Symbol, Option<Vec<Symbol>>)>,
     /// They have no more terms then. None where coefficients vanish at the given parameters only: which of them do is told
     /// by elimination alone.
-    as_short: BTreeSet<Symbol>,
+    as_short: Map<Symbol, ()>,
 }
 
 /// Whether all coefficients are written shortly.
@@ -311,7 +313,7 @@ fn is_short(x: &mut Exprs, row: &Combination) -> bool {
 /// What of the definitions is written out, as far as a bound of work goes.
 fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
     let mut found = WrittenOut::default();
-    let mut known: Map<Symbol, Row> = Map::new();
+    let mut known: Map<Symbol, Row> = Map::with_capacity(x.symbol_count());
     let mut along: Map<Symbol, Row> = Map::new();
     let mut work = 0;
     for &first in ports.definitions.keys() {
@@ -335,7 +337,7 @@ fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
                 found.needed.push((top, through));
             }
             if row.len() <= definition.0.len() && ports.degenerate.is_empty() {
-                found.as_short.insert(top);
+                found.as_short.insert(top, ());
             }
             if work > WORK && ports.undetermined.is_empty() {
                 return found;
@@ -383,11 +385,11 @@ fn through(
 }
 
 fn put_in(x: &Exprs, definition: &Combination, known: &Map<Symbol, Row>) -> Row {
-    with(definition.0.iter().map(|&(symbol, coefficient)| (symbol, x.residue(coefficient))).collect(), known)
+    with(definition.0.iter().map(|&(symbol, coefficient)| (symbol, x.residue(coefficient))), known)
 }
 
 /// A row with others put in.
-fn with(row: Row, known: &Map<Symbol, Row>) -> Row {
+fn with(row: impl IntoIterator<Item = (Symbol, Option<Residue>)>, known: &Map<Symbol, Row>) -> Row {
     let mut terms: Row = Vec::new();
     for (symbol, factor) in row {
         match known.get(&symbol) {

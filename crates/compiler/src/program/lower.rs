@@ -8,6 +8,7 @@ use crate::algebra::{Comparison, Expr, Exprs, Function, Interpolation, Node, Out
 use crate::ids::Table;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
+use std::rc::Rc;
 
 /// Values made of expressions so far.
 pub(super) struct Lowering<'a> {
@@ -20,7 +21,7 @@ pub(super) struct Lowering<'a> {
     known: Vec<Option<Value>>,
     /// Sums whose sine and cosine are made of those of their terms.
     sums: FxHashSet<Expr>,
-    sharing: Sharing,
+    sharing: Rc<Sharing>,
     /// Symbols and expressions of the Newton block that is being lowered.
     inner: Option<Inner>,
 }
@@ -42,7 +43,7 @@ impl<'a> Lowering<'a> {
             symbols: vec![None; exprs.symbol_count()],
             known: vec![None; exprs.len()],
             sums,
-            sharing,
+            sharing: Rc::new(sharing),
             inner: None,
         }
     }
@@ -168,9 +169,9 @@ impl<'a> Lowering<'a> {
     }
 
     fn sum(&mut self, e: Expr, terms: &[Expr]) -> Value {
-        let shared = self.sharing.sums.get(&e).cloned();
-        let parts = match shared {
-            Some(parts) => parts.units.into_iter().map(|(minus, unit)| (minus, self.term(unit))).collect(),
+        let sharing = Rc::clone(&self.sharing);
+        let parts = match sharing.parts(e) {
+            Some(parts) => parts.units.iter().map(|&(minus, unit)| (minus, self.term(unit))).collect(),
             None => terms.iter().map(|&t| self.magnitude(t)).collect(),
         };
         self.total(parts)
@@ -192,13 +193,13 @@ impl<'a> Lowering<'a> {
 
     /// A term of a sum.
     fn term(&mut self, unit: UnitId) -> Value {
-        match self.sharing.units[unit as usize].clone() {
+        match Rc::clone(&self.sharing).units[unit as usize] {
             Unit::Pair(a, b, turned) => {
                 let parts = [(false, self.term(a)), (turned, self.term(b))];
                 self.total(parts.as_slice().into())
             }
-            Unit::Sum(terms) => {
-                let parts = terms.into_iter().map(|(minus, unit)| (minus, self.term(unit))).collect();
+            Unit::Sum(ref terms) => {
+                let parts = terms.iter().map(|&(minus, unit)| (minus, self.term(unit))).collect();
                 self.total(parts)
             }
             Unit::Size(term) => match self.exprs.node(term) {
@@ -212,7 +213,7 @@ impl<'a> Lowering<'a> {
 
     /// A factor of a product: numerator and denominator.
     fn factor(&mut self, unit: UnitId) -> (Option<Value>, Option<Value>) {
-        match self.sharing.units[unit as usize].clone() {
+        match Rc::clone(&self.sharing).units[unit as usize] {
             Unit::Whole(e) => (Some(self.known(e).expect("parts stand before wholes")), None),
             Unit::Inverse(e) => {
                 let value = self.known(e).expect("parts stand before wholes");
@@ -225,10 +226,10 @@ impl<'a> Lowering<'a> {
                 (Some(above), below) => (Some(self.quotient(Some(above), below)), None),
                 below => below,
             },
-            Unit::Product(product) => {
-                let (number, factors) = *product;
-                let number = if number.is_one() { None } else { Some(self.number(&number)) };
-                let (above, below) = self.factors(&factors);
+            Unit::Product(ref product) => {
+                let (number, factors) = &**product;
+                let number = if number.is_one() { None } else { Some(self.number(number)) };
+                let (above, below) = self.factors(factors);
                 let above = self.times(number, above);
                 (Some(self.quotient(above, below)), None)
             }
@@ -281,7 +282,7 @@ impl<'a> Lowering<'a> {
 
     /// The product, with the sign of its number left out if `absolute`.
     fn product(&mut self, e: Expr, factors: &[Expr], absolute: bool) -> Value {
-        if let Some(parts) = self.sharing.products.get(&e).cloned() {
+        if let Some(parts) = Rc::clone(&self.sharing).parts(e) {
             let units: SmallVec<[UnitId; 8]> = parts.units.iter().map(|u| u.1).collect();
             let (numerator, denominator) = self.factors(&units);
             let value = self.quotient(numerator, denominator);

@@ -51,14 +51,15 @@ pub fn schedule(equations: &Equations) -> Program {
 /// Every expression that the rates are evaluated from, and all below it.
 fn evaluated(equations: &Equations) -> Vec<Expr> {
     let exprs = &equations.graph.exprs;
-    let mut step_of: FxHashMap<Symbol, usize> = FxHashMap::default();
+    let mut step_of: Vec<Option<u32>> = vec![None; exprs.symbol_count()];
+    let mut gives = |symbol: Symbol, step: usize| step_of[symbol.0 as usize] = Some(step as u32);
     for (i, step) in equations.steps.iter().enumerate() {
         match step {
-            EquationStep::Assign { symbol, .. } => _ = step_of.insert(*symbol, i),
-            EquationStep::Linear(block) => block.unknowns.iter().for_each(|&s| _ = step_of.insert(s, i)),
+            EquationStep::Assign { symbol, .. } => gives(*symbol, i),
+            EquationStep::Linear(block) => block.unknowns.iter().for_each(|&s| gives(s, i)),
             EquationStep::Newton(block) => {
                 let NewtonBlock { unknowns, body, .. } = &**block;
-                unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| _ = step_of.insert(s, i));
+                unknowns.iter().chain(body.iter().map(|b| &b.0)).for_each(|&s| gives(s, i));
             }
             EquationStep::Guard { .. } => {}
         }
@@ -69,7 +70,8 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
     let mut read = 0;
     loop {
         while let Some(symbol) = open.pop() {
-            let Some(&i) = step_of.get(&symbol).filter(|&&i| !std::mem::replace(&mut seen[i], true)) else { continue };
+            let step = step_of[symbol.0 as usize].map(|i| i as usize);
+            let Some(i) = step.filter(|&i| !std::mem::replace(&mut seen[i], true)) else { continue };
             match &equations.steps[i] {
                 EquationStep::Assign { value, .. } => roots.push(*value),
                 EquationStep::Linear(block) => roots.extend(block.matrix.entries().iter().chain(&block.right)),

@@ -49,8 +49,8 @@ pub(super) type Bag = SmallVec<[(bool, UnitId); 2]>;
 #[derive(Debug, Default)]
 pub(super) struct Sharing {
     pub units: Vec<Unit>,
-    pub products: FxHashMap<Expr, Parts>,
-    pub sums: FxHashMap<Expr, Parts>,
+    /// Products and sums, in the order of their expressions.
+    all: Vec<(Expr, Parts)>,
     /// Expressions of which more than one product takes the reciprocal.
     pub reciprocals: FxHashSet<Expr>,
     known: HashTable<UnitId>,
@@ -89,12 +89,18 @@ pub(super) fn share(x: &Exprs, exprs: &[Expr], varies: &dyn Fn(Expr) -> bool) ->
         }
     }
     sharing.reciprocals = uses.into_iter().filter(|(_, count)| *count > 1).map(|(e, _)| e).collect();
-    sharing.products = products.into_iter().collect();
-    sharing.sums = sums.into_iter().collect();
+    products.extend(sums);
+    products.sort_unstable_by_key(|whole| whole.0);
+    sharing.all = products;
     sharing
 }
 
 impl Sharing {
+    /// How a product or sum is put together, if it is.
+    pub fn parts(&self, e: Expr) -> Option<&Parts> {
+        self.all.binary_search_by_key(&e, |whole| whole.0).ok().map(|at| &self.all[at].1)
+    }
+
     fn unit(&mut self, unit: Unit) -> UnitId {
         let Sharing { units, known, .. } = self;
         let hash = |unit: &Unit| FxBuildHasher.hash_one(unit);
@@ -173,7 +179,11 @@ impl Sharing {
         let mut where_: Vec<SmallVec<[u32; 4]>> = vec![SmallVec::new(); self.units.len()];
         for (i, (_, bag)) in bags.iter().enumerate() {
             bag.units.iter().for_each(|u| where_[u.1 as usize].push(i as u32));
-            for (pair, n) in pairs(&bag.units) {
+        }
+        // A pair with what is there once is never found twice.
+        let often = |unit: UnitId| where_[unit as usize].len() > 1;
+        for (pair, n) in bags.iter().flat_map(|(_, bag)| pairs(&bag.units)) {
+            if often(pair.0) && often(pair.1) {
                 *count.entry(pair).or_default() += n;
             }
         }
@@ -202,7 +212,9 @@ impl Sharing {
                 }
                 while take(units, pair, new) {}
                 for (pair, n) in before {
-                    *count.get_mut(&pair).expect("a pair that was counted") -= n;
+                    if let Some(count) = count.get_mut(&pair) {
+                        *count -= n;
+                    }
                 }
                 for (pair, n) in pairs(units) {
                     *count.entry(pair).or_default() += n;

@@ -25,7 +25,7 @@ use crate::verdict::Made;
 /// A form at its start.
 #[derive(Clone)]
 pub(super) struct Subject<'m> {
-    graph: &'m BondGraph,
+    graph: &'m Arc<BondGraph>,
     form: Form,
     system: Ready,
 }

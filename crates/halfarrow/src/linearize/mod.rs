@@ -7,6 +7,8 @@ mod structure;
 mod symbolic;
 mod zeros;
 
+use std::sync::Arc;
+
 use halfarrow_compiler::bond_graph::{self, BondGraph, ElementId, HeldKind, InputId, Kind, Meaning, Variable};
 use halfarrow_compiler::equations::{Equations, Form, Position};
 use halfarrow_compiler::program::{Observed, Program};
@@ -185,7 +187,7 @@ impl Model {
         };
         let mut model = self.clone();
         for name in names.iter().filter(|name| !declared().contains(*name)) {
-            if !add_input(&mut model.graph, name) {
+            if !add_input(Arc::make_mut(&mut model.graph), name) {
                 let known = declared().into_iter().chain(sources()).collect();
                 return Err(Problem::UnknownInput { name: name.clone(), known }.into());
             }
