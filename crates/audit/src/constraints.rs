@@ -22,7 +22,7 @@ pub(crate) struct Share {
 
 /// The shares of all constraints, with their factors in the pool.
 pub(crate) fn shares(graph: &BondGraph, x: &mut Exprs) -> Vec<Share> {
-    graph.constraints.iter().flat_map(|c| shares_of(graph, x, c)).collect()
+    graph.constraints.iter().filter(|c| !c.drawn).flat_map(|c| shares_of(graph, x, c)).collect()
 }
 
 fn shares_of(graph: &BondGraph, x: &mut Exprs, constraint: &Constraint) -> Vec<Share> {

@@ -784,3 +784,31 @@ fn linkages_meet_their_references() {
         }
     }
 }
+
+/// A zero compliance that holds a known displacement is a `constraint` whose bonds are drawn.
+#[test]
+fn a_drawn_zero_compliance_holds_a_displacement() {
+    let bead = |held: &str| {
+        format!(
+            "model Bead\n1:x -> I:mx(2)\n1:y -> I:my(2)\nstate px' = x.f from 3\nstate py' = y.f from 4\nSe:g(-9.81) -> y\n{held}"
+        )
+    };
+    let by_bonds = |a: &str, b: &str| {
+        bead(&format!(
+            "x -> TF:a(m = {a}) -> 0:push\ny -> TF:b(m = {b}) -> push\nZC:rod(q = px^2 + py^2 - 25) -> push\n"
+        ))
+    };
+    let drawn = by_bonds("-2*px", "-2*py");
+    let written = bead("constraint rod: px^2 + py^2 = 25\n");
+    assert_eq!(states(&drawn), states(&written));
+    let options = Run { to: 1.0, rtol: 1e-10, ..Run::default() };
+    let (drawn, written) = (run(&drawn, &options), run(&written, &options));
+    for name in ["px", "py", "rod.e", "rod.drift"] {
+        let (a, b) = (last(&drawn, name), last(&written, name));
+        assert!((a - b).abs() < 1e-9, "{name}: {a} by bonds, {b} by a constraint");
+    }
+    // Bonds by which the displacement does not change at the flow of its bond.
+    let wrong = model(&by_bonds("1", "1")).simulate(&options, &mut |_| true);
+    let refused = wrong.err().expect("it is refused").render(false);
+    assert!(refused.contains("does not satisfy the model"), "{refused}");
+}

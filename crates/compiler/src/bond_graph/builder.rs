@@ -6,6 +6,7 @@ use std::rc::Rc;
 use rustc_hash::FxHashMap;
 
 use super::common::representatives;
+use super::constraint::HeldDisplacement;
 use super::dimension::{Clash, Dimensions, Quantity, Reason};
 use super::faults::Faults;
 use super::files::Files;
@@ -186,6 +187,8 @@ pub(super) struct Builder<'a, 'f> {
     pub beyond: BTreeMap<usize, (usize, Symbol)>,
     /// Variables of the bond of every constraint.
     pub reactions: Vec<Pair>,
+    /// Displacements that drawn zero compliances hold at zero.
+    pub held_displacements: Vec<HeldDisplacement>,
     /// Dimensions of the moduli of two-ports.
     pub moduli: BTreeMap<usize, Quantity>,
     /// Stored quantities of every port of every part.
@@ -250,6 +253,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             common: representatives(flat, wiring),
             beyond: BTreeMap::new(),
             reactions: Vec::new(),
+            held_displacements: Vec::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
             shapes: FxHashMap::default(),

@@ -30,6 +30,16 @@ pub(super) struct Sides {
     span: Span,
 }
 
+/// A displacement that a drawn zero compliance holds at zero: its bonds say on what it acts.
+pub(super) struct HeldDisplacement {
+    /// The element.
+    pub part: usize,
+    /// The displacement, whose rate is the flow of its bond.
+    pub expr: Expr,
+    /// Where it stands.
+    pub span: Span,
+}
+
 /// A constraint as a relation between flows.
 pub(super) struct Relation {
     at: usize,
@@ -83,6 +93,7 @@ impl<'a> Builder<'a, '_> {
         let mut visit = |x: &Exprs, e: Expr| wholes.extend(x.has_wholes(e).then_some(e));
         kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut |e| visit(&self.exprs, *e)));
         sides.iter().for_each(|side| visit(&self.exprs, side.expr));
+        self.held_displacements.iter().for_each(|held| visit(&self.exprs, held.expr));
         let displacement =
             |s: Symbol| matches!(self.role(s), Some(Role::Known(Meaning::Signal(_) | Meaning::Stored(_))));
         let idle: BTreeSet<Symbol> =
@@ -92,6 +103,7 @@ impl<'a> Builder<'a, '_> {
         let mut put = |e: &mut Expr| *e = short.get(e).copied().unwrap_or(*e);
         kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut put));
         sides.iter_mut().for_each(|side| put(&mut side.expr));
+        self.held_displacements.iter_mut().for_each(|held| put(&mut held.expr));
     }
 
     /// The coefficient of restitution of an inequality, 0 if none is given. The outer `None`: at fault.
@@ -229,7 +241,15 @@ impl<'a> Builder<'a, '_> {
 
     /// Builds the constraints into the structure, behind all bonds that are drawn.
     pub fn build_constraints(&mut self, structure: &mut Structure, relations: &[Relation]) -> Vec<Constraint> {
-        relations.iter().map(|relation| self.build(structure, relation)).collect()
+        let mut all: Vec<Constraint> = relations.iter().map(|relation| self.build(structure, relation)).collect();
+        for HeldDisplacement { part, expr, span } in std::mem::take(&mut self.held_displacements) {
+            let element = ElementId::new(part);
+            let bond = structure.elements[element].ports[0].bond;
+            let multiplier = self.exprs.sym(structure.bonds[bond].effort);
+            let name = self.part(part).name.clone();
+            all.push(Constraint { name, expr, holonomic: true, drawn: true, element, multiplier, span });
+        }
+        all
     }
 
     fn build(&mut self, structure: &mut Structure, r: &Relation) -> Constraint {
@@ -260,8 +280,15 @@ impl<'a> Builder<'a, '_> {
         let cell = cell_of(self.flat.names.turn_around(*here));
         (first..structure.elements.len()).for_each(|at| structure.elements[ElementId::new(at)].cell = cell);
         let multiplier = self.exprs.sym(effort);
-        let constraint =
-            Constraint { name, expr: r.expr, holonomic: r.holonomic, element: zc, multiplier, span: r.span };
+        let constraint = Constraint {
+            name,
+            expr: r.expr,
+            holonomic: r.holonomic,
+            drawn: false,
+            element: zc,
+            multiplier,
+            span: r.span,
+        };
         if let Some(restitution) = r.restitution {
             self.one_sided(&constraint, r.rest, flow, restitution);
         }

@@ -1,6 +1,7 @@
 //! Elements with their laws.
 
 use super::builder::{Builder, Value};
+use super::constraint::HeldDisplacement;
 use super::dimension::Quantity;
 use super::flatten::{Part, Word};
 use super::multibonds::Width;
@@ -56,7 +57,7 @@ impl<'a> Builder<'a, '_> {
             Word::Zero | Word::One | Word::De | Word::Df => self.plain(part),
             Word::Se => self.only_value(part, "e", true).map(|value| Kind::EffortSource { value }),
             Word::Sf => self.only_value(part, "f", true).map(|value| Kind::FlowSource { value }),
-            Word::Zc => self.only_value(part, "f", false).map(|flow| Kind::ZeroCompliance { flow }),
+            Word::Zc => self.zero_compliance(part),
             Word::ResidualSe => self.residual(part).map(|residual| Kind::ResidualEffort { residual }),
             Word::ResidualSf => self.residual(part).map(|residual| Kind::ResidualFlow { residual }),
             Word::Tf if matches!(p.width, Width::Matrix { .. }) => {
@@ -187,6 +188,20 @@ impl<'a> Builder<'a, '_> {
         let quantity = if gives == "e" { &self.pairs[wire].effort_in } else { &self.pairs[wire].flow_in };
         self.equal_by_law(&value.quantity, &quantity.clone(), part);
         Some(value.expr)
+    }
+
+    /// A zero compliance: what its flow is held at, or the displacement that it holds at zero, whose rate its flow is.
+    fn zero_compliance(&mut self, part: usize) -> Option<Kind> {
+        let known = self.part(part).ast.args.iter().find(|a| a.label.as_ref().is_some_and(|l| l.name.text == "q"));
+        let Some(known) = known else {
+            return self.only_value(part, "f", false).map(|flow| Kind::ZeroCompliance { flow });
+        };
+        self.single(part, &["f", "q"]).ok()?;
+        let value = self.arg(part, &known.value, false)?;
+        let rate = self.pairs[self.wire_at(part, 0)?].flow_in.clone();
+        self.equal_by_law(&value.quantity, &rate.times(&Quantity::of(Dim::SECOND)), part);
+        self.held_displacements.push(HeldDisplacement { part, expr: value.expr, span: known.value.span });
+        Some(Kind::ZeroCompliance { flow: ZERO })
     }
 
     #[allow(clippy::option_option)]

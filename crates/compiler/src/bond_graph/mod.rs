@@ -674,6 +674,8 @@ pub struct Constraint {
     pub expr: Expr,
     /// Whether it is on displacements.
     pub holonomic: bool,
+    /// Whether its zero compliance and the bonds by which it acts are drawn: else it acts on the flows of its rate.
+    pub drawn: bool,
     /// The element that stands for it.
     pub element: ElementId,
     /// The multiplier `name.e`, in effort symbols.

@@ -54,8 +54,10 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
         }
     }
     for constraint in &graph.constraints {
-        let value = value_of(d, constraint.multiplier);
-        add(&format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
+        if !constraint.drawn {
+            let value = value_of(d, constraint.multiplier);
+            add(&format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
+        }
         if constraint.holonomic {
             let drift = value_of(d, constraint.expr);
             add(&format!("{}.drift", constraint.name), drift, None, ObservedKind::Drift, false);
