@@ -809,6 +809,6 @@ fn a_drawn_zero_compliance_holds_a_displacement() {
     }
     // Bonds by which the displacement does not change at the flow of its bond.
     let wrong = model(&by_bonds("1", "1")).simulate(&options, &mut |_| true);
-    let refused = wrong.err().expect("it is refused").render(false);
+    let refused = wrong.expect_err("it is refused").render(false);
     assert!(refused.contains("does not satisfy the model"), "{refused}");
 }
