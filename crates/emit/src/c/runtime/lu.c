@@ -619,29 +619,21 @@ static void ha_lu_solve(ha_lu *l, $real *b)
 }
 
 //item ha_lu_solve_once
-/* The same without refinement: for Newton's method, whose next correction refines this one. A float has too few digits for
- * that. */
+/* The same, of a sparse matrix without refinement: for Newton's method, whose next correction refines this one. A float has too
+ * few digits for that. */
 static void ha_lu_solve_once(ha_lu *l, $real *b)
 {
 //if single
     $ha_lu_solve(l, b);
-    return;
-//end
+//else
 //if sparse
     if (l->pattern->order != NULL && l->order[l->n] == 0) {
         $ha_sparse_substitute(l, b);
         return;
     }
-    if (l->pattern->order != NULL && l->order[l->n] == 2) {
-        $ha_sparse_solve_definite(l, b);
-        return;
-    }
 //end
-    if (l->n == 1 || l->order[0] < 0) {
-        $ha_lu_solve(l, b);
-        return;
-    }
-    $ha_lu_substitute(l, b);
+    $ha_lu_solve(l, b);
+//end
 }
 
 //item ha_lu_is_positive

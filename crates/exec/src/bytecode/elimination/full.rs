@@ -162,21 +162,6 @@ impl Lu {
         }
     }
 
-    /// The same without refinement.
-    pub fn solve_once(&mut self, b: &mut [f64]) {
-        let n = self.size;
-        if self.definite || n == 1 {
-            return self.solve(b);
-        }
-        let Lu { factors, order, work, .. } = self;
-        match n {
-            2 => substitute(2, factors, order, work, b),
-            3 => substitute(3, factors, order, work, b),
-            4 => substitute(4, factors, order, work, b),
-            n => substitute(n, factors, order, work, b),
-        }
-    }
-
     /// By general factors, for a size that is known where this is called.
     #[inline(always)]
     fn solve_of_size(&mut self, n: usize, b: &mut [f64]) {

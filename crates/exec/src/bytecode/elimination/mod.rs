@@ -62,10 +62,10 @@ impl Factors {
         }
     }
 
-    /// The same without refinement: for Newton's method, whose next correction refines this one.
+    /// The same, of sparse ones without refinement: for Newton's method, whose next correction refines this one.
     pub fn solve_once(&mut self, b: &mut [f64]) {
         match self {
-            Factors::Full(lu, _) => lu.solve_once(b),
+            Factors::Full(lu, _) => lu.solve(b),
             Factors::Sparse(lu) => lu.solve_once(b),
         }
     }

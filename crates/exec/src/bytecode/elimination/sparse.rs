@@ -176,7 +176,7 @@ impl SparseLu {
     /// The same without refinement.
     pub fn solve_once(&mut self, b: &mut [f64]) {
         match (self.factored, &mut self.full, &mut self.definite) {
-            (Factored::Full, Some(lu), _) => return lu.solve_once(b),
+            (Factored::Full, Some(lu), _) => return lu.solve(b),
             (Factored::Definite, _, Some(definite)) => return definite.solve(&self.symbolic, b),
             (Factored::Exchanged, _, _) => return self.solve(b),
             _ => {}

@@ -1,11 +1,10 @@
 //! Evaluations of a block, Newton corrections and their norms.
 //!
 //! The (ordinary) correction at `x` solves `J(x) dx = -F(x)`; the simplified correction at the trial point solves
-//! `J(x) dx = -F(trial)` with the same factors, which makes it the measure of the natural monotonicity test. In the iteration
-//! the latter is not refined, nor the former of sparse blocks: what the solution of one misses, the next one finds.
+//! `J(x) dx = -F(trial)` with the same factors, which makes it the measure of the natural monotonicity test. Those of
+//! sparse blocks are not refined: what the solution of one misses, the next one finds.
 
 use super::workspace::Newton;
-use crate::bytecode::elimination::Factors;
 use crate::bytecode::frame::{Frame, entries};
 use crate::bytecode::instruction::Solve;
 
@@ -56,10 +55,7 @@ impl Frame {
         for (i, &right) in solve.right.iter().enumerate() {
             newton.correction[i] = newton.offset[i] - r[right as usize];
         }
-        match solver.factors {
-            Factors::Sparse(_) => solver.factors.solve_once(&mut newton.correction),
-            Factors::Full(..) => solver.factors.solve(&mut newton.correction),
-        }
+        solver.factors.solve_once(&mut newton.correction);
     }
 
     /// Keeps the first correction and its right-hand side, from which the continuation is judged.

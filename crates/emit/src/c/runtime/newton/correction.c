@@ -45,13 +45,7 @@ static void ha_newton_correction(ha_newton *w)
     for (i = 0; i < w->n; ++i) {
         w->correction[i] = w->offset[i] - w->right[i];
     }
-//if sparse
-    if (w->lu.pattern->order != NULL) {
-        $ha_lu_solve_once(&w->lu, w->correction);
-        return;
-    }
-//end
-    $ha_lu_solve(&w->lu, w->correction);
+    $ha_lu_solve_once(&w->lu, w->correction);
 }
 
 //item ha_greatest
