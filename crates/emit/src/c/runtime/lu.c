@@ -432,6 +432,25 @@ static int ha_sparse_definite(ha_lu *l)
     return 1;
 }
 
+//item ha_sparse_substitute_back
+/* From the last place on: each unknown by the entries right of the diagonal and the inverse of its pivot. l->work holds what
+ * is left of the right side. */
+static void ha_sparse_substitute_back(const ha_lu *l, $real *b)
+{
+    const ha_order *o = l->pattern->order;
+    int place;
+    int i;
+    for (place = l->n - 1; place >= 0; --place) {
+        $real left = l->work[place];
+        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
+            const $real product = l->upper[i] * l->work[o->upper[i]];
+            left -= product;
+        }
+        l->work[place] = left * l->inverse[place];
+        b[o->columns[place]] = l->work[place];
+    }
+}
+
 //item ha_sparse_solve_definite
 static void ha_sparse_solve_definite(const ha_lu *l, $real *b)
 {
@@ -448,15 +467,7 @@ static void ha_sparse_solve_definite(const ha_lu *l, $real *b)
             l->work[o->upper[i]] -= product;
         }
     }
-    for (place = l->n - 1; place >= 0; --place) {
-        $real left = l->work[place];
-        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
-            const $real product = l->upper[i] * l->work[o->upper[i]];
-            left -= product;
-        }
-        l->work[place] = left * l->inverse[place];
-        b[o->columns[place]] = l->work[place];
-    }
+    $ha_sparse_substitute_back(l, b);
 }
 
 //item ha_sparse_factor
@@ -515,15 +526,7 @@ static void ha_sparse_substitute(ha_lu *l, $real *b)
         }
         l->work[place] = left;
     }
-    for (place = l->n - 1; place >= 0; --place) {
-        $real left = l->work[place];
-        for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
-            const $real product = l->upper[i] * l->work[o->upper[i]];
-            left -= product;
-        }
-        l->work[place] = left * l->inverse[place];
-        b[o->columns[place]] = l->work[place];
-    }
+    $ha_sparse_substitute_back(l, b);
 }
 
 //item ha_sparse_solve

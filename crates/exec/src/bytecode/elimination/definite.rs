@@ -5,6 +5,7 @@
 //!
 //! Exported C does the same operations in the same order.
 
+use super::sparse::substitute_back;
 use halfarrow_compiler::sparse::SymbolicFactors;
 
 /// The factors of a symmetric matrix. `U` has ones on its diagonal; what is kept is `D U`.
@@ -83,12 +84,7 @@ impl SparseDefinite {
                 work[j as usize] -= u * done;
             }
         }
-        for (place, &column) in symbolic.columns.iter().enumerate().rev() {
-            let factors = upper[symbolic.upper.row(place)].iter().zip(symbolic.upper.columns_of(place));
-            let left = factors.fold(work[place], |left, (u, &j)| left - u * work[j as usize]);
-            work[place] = left * inverse[place];
-            b[column as usize] = work[place];
-        }
+        substitute_back(symbolic, (upper, inverse), work, b);
     }
 
     /// Whether the determinant of the factored matrix is above zero.

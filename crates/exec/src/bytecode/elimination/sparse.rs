@@ -173,13 +173,10 @@ impl SparseLu {
         self.rest = rest;
     }
 
-    /// The same without refinement.
+    /// The same, without refinement of sparse factors.
     pub fn solve_once(&mut self, b: &mut [f64]) {
-        match (self.factored, &mut self.full, &mut self.definite) {
-            (Factored::Full, Some(lu), _) => return lu.solve(b),
-            (Factored::Definite, _, Some(definite)) => return definite.solve(&self.symbolic, b),
-            (Factored::Exchanged, _, _) => return self.solve(b),
-            _ => {}
+        if self.factored != Factored::Sparse {
+            return self.solve(b);
         }
         let symbolic = Arc::clone(&self.symbolic);
         self.substitute(&symbolic, b);
@@ -232,12 +229,7 @@ impl SparseLu {
             let factors = lower[symbolic.lower.row(place)].iter().zip(symbolic.lower.columns_of(place));
             work[place] = factors.fold(b[row as usize], |left, (l, &k)| left - l * work[k as usize]);
         }
-        for (place, &column) in symbolic.columns.iter().enumerate().rev() {
-            let factors = upper[symbolic.upper.row(place)].iter().zip(symbolic.upper.columns_of(place));
-            let left = factors.fold(work[place], |left, (u, &j)| left - u * work[j as usize]);
-            work[place] = left * inverse[place];
-            b[column as usize] = work[place];
-        }
+        substitute_back(symbolic, (upper, inverse), work, b);
     }
 
     /// Whether the determinant of the factored matrix is above zero; with exchanges of rows, whether it was so before.
@@ -248,6 +240,22 @@ impl SparseLu {
             (Factored::Exchanged, _, _) => self.positive,
             _ => self.inverse.iter().fold(!self.symbolic.odd, |positive, &inverse| positive == (inverse > 0.0)),
         }
+    }
+}
+
+/// From the last place on: each unknown by the entries right of the diagonal and the inverse of its pivot. `work` holds what is
+/// left of the right side.
+pub(super) fn substitute_back(
+    symbolic: &SymbolicFactors,
+    (upper, inverse): (&[f64], &[f64]),
+    work: &mut [f64],
+    b: &mut [f64],
+) {
+    for (place, &column) in symbolic.columns.iter().enumerate().rev() {
+        let factors = upper[symbolic.upper.row(place)].iter().zip(symbolic.upper.columns_of(place));
+        let left = factors.fold(work[place], |left, (u, &j)| left - u * work[j as usize]);
+        work[place] = left * inverse[place];
+        b[column as usize] = work[place];
     }
 }
 
