@@ -116,6 +116,21 @@ pub(super) fn greatest(most: f64, size: f64) -> f64 {
     }
 }
 
+/// The inverse of the magnitude of each unknown, or of its step where that is greater.
+fn weigh(weight: &mut [f64], scale: &[f64], steps: &[f64]) {
+    for (weight, (scale, step)) in weight.iter_mut().zip(scale.iter().zip(steps)) {
+        *weight = 1.0 / scale.max(step.abs()).max(f64::MIN_POSITIVE);
+    }
+}
+
+/// Adds steps, with the magnitudes to which they lead.
+fn go_on(x: &mut [f64], scale: &mut [f64], steps: &[f64]) {
+    for ((x, scale), step) in x.iter_mut().zip(scale).zip(steps) {
+        *x += step;
+        *scale = scale.max(x.abs());
+    }
+}
+
 /// Whether these registers are finite: 0 times what is not is no number.
 fn all_finite(registers: &[u32], r: &[f64]) -> bool {
     let rest = |v: u32| 0.0 * r[v as usize];
@@ -128,10 +143,12 @@ fn all_finite(registers: &[u32], r: &[f64]) -> bool {
 impl Newton {
     /// Scales unknowns by their magnitudes so far, or by their corrections where these are greater.
     pub(super) fn weigh_by_correction(&mut self) {
-        let sizes = self.scale.iter().zip(&self.correction);
-        for (weight, (scale, step)) in self.weight.iter_mut().zip(sizes) {
-            *weight = 1.0 / scale.max(step.abs()).max(f64::MIN_POSITIVE);
-        }
+        weigh(&mut self.weight, &self.scale, &self.correction);
+    }
+
+    /// The same by the first corrections.
+    pub(super) fn weigh_by_first_correction(&mut self) {
+        weigh(&mut self.weight, &self.scale, &self.first_correction);
     }
 
     /// Goes to the start.
@@ -159,17 +176,11 @@ impl Newton {
 
     /// Goes on by the correction.
     pub(super) fn add_correction(&mut self) {
-        for i in 0..self.x.len() {
-            self.x[i] += self.correction[i];
-            self.scale[i] = self.scale[i].max(self.x[i].abs());
-        }
+        go_on(&mut self.x, &mut self.scale, &self.correction);
     }
 
     pub(super) fn add_simplified_correction(&mut self) {
-        for i in 0..self.x.len() {
-            self.x[i] += self.simplified[i];
-            self.scale[i] = self.scale[i].max(self.x[i].abs());
-        }
+        go_on(&mut self.x, &mut self.scale, &self.simplified);
     }
 
     /// Gives an unknown that is 0, and stays so in the first correction, the magnitude at which it would count in one of

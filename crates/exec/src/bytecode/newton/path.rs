@@ -24,13 +24,14 @@ impl Frame {
             return newton.contracts;
         }
         let n = newton.x.len();
-        let mut most = CLOSE_TO_ROUNDING;
-        for i in 0..n {
-            let first = newton.first_correction[i].abs();
-            newton.weight[i] = 1.0 / newton.scale[i].max(first).max(f64::MIN_POSITIVE);
-            most = greatest(most, first * newton.weight[i]);
-            newton.simplified[i] = newton.x[i] - newton.start[i];
-        }
+        newton.weigh_by_first_correction();
+        let firsts = newton.first_correction.iter().zip(&newton.weight).map(|(first, weight)| first.abs() * weight);
+        let most = firsts.fold(CLOSE_TO_ROUNDING, greatest);
+        newton
+            .simplified
+            .iter_mut()
+            .zip(newton.x.iter().zip(&newton.start))
+            .for_each(|(way, (x, start))| *way = x - start);
         let mut off = newton.distance_from_first_correction();
         // What the first correction would have been with the last Jacobian; with the first one it is itself.
         if !newton.first_factors {

@@ -36,10 +36,9 @@ static int ha_is_continuation(ha_newton *w)
     if (!w->contracts || w->rests || $ha_all_zero(w->first_correction, n)) {
         return w->contracts;
     }
+    $ha_weigh(w, w->first_correction);
     for (i = 0; i < n; ++i) {
-        const $real first = $fabs(w->first_correction[i]);
-        w->weight[i] = $1.0 / $ha_max($ha_max(w->scale[i], first), $DBL_MIN);
-        most = $ha_greatest(most, first * w->weight[i]);
+        most = $ha_greatest(most, $fabs(w->first_correction[i]) * w->weight[i]);
         w->simplified[i] = w->x[i] - w->start[i];
     }
     off = $ha_distance_from_first_correction(w);
@@ -90,7 +89,7 @@ static int ha_path_is_regular_at(ha_model *m, ha_newton *w, int points)
         && !($ha_evaluate_on_path(m, w, $0.0) && $ha_newton_factor(w))) {
         return 0;
     }
-    $ha_weigh_by_correction(w);
+    $ha_weigh(w, w->correction);
     for (point = 0; point <= points; ++point) {
         $real level;
         if (!$ha_evaluate_on_path(m, w, ($real)point / ($real)points)) {

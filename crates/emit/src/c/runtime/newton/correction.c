@@ -58,13 +58,13 @@ static $real ha_greatest($real most, $real size)
     return most;
 }
 
-//item ha_weigh_by_correction
-/* Scales unknowns by their magnitudes so far, or by their corrections where these are greater. */
-static void ha_weigh_by_correction(ha_newton *w)
+//item ha_weigh
+/* Scales unknowns by their magnitudes so far, or by these steps where they are greater. */
+static void ha_weigh(ha_newton *w, const $real *steps)
 {
     int i;
     for (i = 0; i < w->n; ++i) {
-        w->weight[i] = $1.0 / $ha_max($ha_max(w->scale[i], $fabs(w->correction[i])), $DBL_MIN);
+        w->weight[i] = $1.0 / $ha_max($ha_max(w->scale[i], $fabs(steps[i])), $DBL_MIN);
     }
 }
 
@@ -74,7 +74,7 @@ static $real ha_correction_norm(ha_newton *w)
 {
     $real most = $0.0;
     int i;
-    $ha_weigh_by_correction(w);
+    $ha_weigh(w, w->correction);
     for (i = 0; i < w->n; ++i) {
         most = $ha_greatest(most, $fabs(w->correction[i]) * w->weight[i]);
     }
@@ -83,7 +83,7 @@ static $real ha_correction_norm(ha_newton *w)
 
 //item ha_simplified_correction_norm
 /* The simplified correction at the point evaluated last, by the Jacobian factored last, and its norm, scaled as
- * ha_weigh_by_correction has said. */
+ * ha_weigh has said. */
 static $real ha_simplified_correction_norm(ha_newton *w, int refined)
 {
     $real most = $0.0;
@@ -165,22 +165,13 @@ static void ha_accept_trial(ha_newton *w)
     }
 }
 
-//item ha_add_correction
-static void ha_add_correction(ha_newton *w)
+//item ha_go_on
+/* Adds steps, with the magnitudes to which they lead. */
+static void ha_go_on(ha_newton *w, const $real *steps)
 {
     int i;
     for (i = 0; i < w->n; ++i) {
-        w->x[i] += w->correction[i];
-        w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
-    }
-}
-
-//item ha_add_simplified_correction
-static void ha_add_simplified_correction(ha_newton *w)
-{
-    int i;
-    for (i = 0; i < w->n; ++i) {
-        w->x[i] += w->simplified[i];
+        w->x[i] += steps[i];
         w->scale[i] = $ha_max(w->scale[i], $fabs(w->x[i]));
     }
 }

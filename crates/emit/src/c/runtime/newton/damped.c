@@ -102,7 +102,7 @@ static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalizati
                 $ha_accept_trial(w);
                 *contracts = damping == $1.0 && (simplified <= $0.25 * norm || norm <= $CLOSE_TO_ROUNDING);
                 if (*contracts && simplified * simplified <= $0.125 * $DBL_EPSILON * norm) {
-                    $ha_add_simplified_correction(w);
+                    $ha_go_on(w, w->simplified);
                     return HA_CONVERGED;
                 }
                 return norm <= $4.0 * $DBL_EPSILON ? HA_CONVERGED : HA_ACCEPTED;
@@ -181,7 +181,7 @@ static int ha_iterate(ha_model *m, ha_newton *w, int globalization)
         }
         if (norm <= $4.0 * $DBL_EPSILON && !w->positions) {
             w->rests = iteration == 0;
-            $ha_add_correction(w);
+            $ha_go_on(w, w->correction);
             return 1;
         }
         outcome = $ha_damped_step(m, w, norm, globalization, &contracts);
