@@ -62,7 +62,7 @@ pub fn compile(text: Text<'_>, form: Form) -> Result<Reached<Program>, Found> {
 /// Names, units and parts: the bond graph.
 ///
 /// # Errors
-/// All faults of the text and of the names, units and bonds in it.
+/// All faults of the text; if there are none, all those of the names, units and bonds in it.
 pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
     bond_graph_of(read(text), text)
 }
@@ -89,7 +89,10 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
     let Read { parsed, sources } = read;
     let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
-    diagnostics.0.extend(elaborated.diagnostics.0);
+    // What could not be read is not there: that others name it, or that its bonds are missing, are no faults of their own.
+    if !diagnostics.has_errors() {
+        diagnostics.0.extend(elaborated.diagnostics.0);
+    }
     let names = Arc::new(elaborated.names);
     let mut found = Found { diagnostics, sources: elaborated.sources, names };
     match elaborated.graph {

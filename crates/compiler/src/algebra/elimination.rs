@@ -194,6 +194,11 @@ impl NumericPoint {
         self.known.clear();
     }
 
+    /// Says where the point is in a direction that no value so far depends on.
+    pub fn place(&mut self, symbol: Symbol, value: f64) {
+        self.symbols.insert(symbol, value);
+    }
+
     /// The value of a symbol there.
     pub fn of(&self, symbol: Symbol) -> f64 {
         self.symbols.get(&symbol).copied().unwrap_or(1.0)

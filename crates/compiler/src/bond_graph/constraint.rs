@@ -247,6 +247,8 @@ impl<'a> Builder<'a, '_> {
             let bond = structure.elements[element].ports[0].bond;
             let multiplier = self.exprs.sym(structure.bonds[bond].effort);
             let name = self.part(part).name.clone();
+            // As in a plane loop across its plane: numbers whose sum is 0 are not so in floats.
+            let expr = if self.exprs.is_zero(expr) { ZERO } else { expr };
             all.push(Constraint { name, expr, holonomic: true, drawn: true, element, multiplier, span });
         }
         all

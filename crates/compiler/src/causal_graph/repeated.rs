@@ -1,17 +1,20 @@
 //! Constraints on displacements that others keep wherever the machine can be, as those of a third crank under a
 //! parallelogram do. The rows of their slopes are independent almost everywhere and depend on each other only where the
-//! loops are closed: rank is found at assembled positions, and has to stay the same along the motion. Source: `method.md`,
-//! 5.4.
+//! loops are closed: rank is found at assembled positions, and has to stay the same along the motion. So is what moves nothing
+//! that a cut joint holds, as the spin of a rod about the ball at its end does: off the assembled positions it would. Source:
+//! `method.md`, 5.4.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::start_point::{least_step, start_values};
-use crate::algebra::{Expr, Exprs, Symbol};
-use crate::bond_graph::{BondGraph, Constraint, Kind, Meaning};
+use crate::algebra::{Expr, Exprs, Symbol, ZERO};
+use crate::bond_graph::{BondGraph, Constraint, ElementId, Kind, Meaning};
 use crate::ids::Map;
 
 /// A row that is so much shorter without what the others have of it depends on them.
 const DEPENDENT: f64 = 1e-8;
+/// Slopes below this part of the greatest ones are rounding.
+const STILL: f64 = 1e-9;
 /// A constraint is kept that is missed by less than this.
 const KEPT: f64 = 1e-10;
 /// How far the machine is moved to see whether they still depend on each other there.
@@ -22,11 +25,15 @@ const ITERATIONS: usize = 30;
 /// More constraints are not examined.
 const MOST: usize = 300;
 
-/// The graph with efforts of 0 in the place of constraints that repeat others, and which they are, by their numbers.
+/// The graph with efforts of 0 in the place of constraints that repeat others, and which they are, by their numbers; and with
+/// moduli of 0 where what moves does not move what a joint holds.
 pub(super) fn without_repeated(graph: &BondGraph) -> (BondGraph, Vec<usize>) {
     let mut x = graph.exprs.clone();
-    let repeated = repeated(&mut x, graph);
+    let (repeated, idle) = repeated(&mut x, graph);
     let mut left = graph.clone();
+    for transformer in idle {
+        left.elements[transformer].kind = Kind::Transformer { modulus: ZERO };
+    }
     for &constraint in &repeated {
         let element = &mut left.elements[graph.constraints[constraint].element];
         element.kind = Kind::EffortSource { value: x.int(0) };
@@ -43,12 +50,14 @@ struct Loops<'a> {
     together: Vec<Vec<Symbol>>,
 }
 
-fn repeated(x: &mut Exprs, graph: &BondGraph) -> BTreeSet<usize> {
+/// Constraints that repeat others, and the transformers by which nothing that moves acts on a joint.
+fn repeated(x: &mut Exprs, graph: &BondGraph) -> (BTreeSet<usize>, Vec<ElementId>) {
+    let none = (BTreeSet::new(), Vec::new());
     let held = |c: &Constraint| matches!(graph.elements[c.element].kind, Kind::ZeroCompliance { .. });
     let acts = |c: &usize| graph.constraints[*c].holonomic && held(&graph.constraints[*c]);
     let numbers: Vec<usize> = (0..graph.constraints.len()).filter(acts).collect();
     if !(2..=MOST).contains(&numbers.len()) {
-        return BTreeSet::new();
+        return none;
     }
     let constraints: Vec<Expr> = numbers.iter().map(|&c| graph.constraints[c].expr).collect();
     let mut together: BTreeMap<Expr, Vec<Symbol>> = BTreeMap::new();
@@ -64,19 +73,58 @@ fn repeated(x: &mut Exprs, graph: &BondGraph) -> BTreeSet<usize> {
     let loops = Loops { x, constraints, slopes, together };
     let start = start_values(x, graph);
     if loops.missed(&start).iter().any(|m| m.is_nan() || m.abs() > KEPT) {
-        return BTreeSet::new();
+        return none;
     }
     let (mut found, basis) = loops.dependent(&start);
-    if found.is_empty() {
-        return found;
+    let mut idle = acting(graph, &numbers);
+    idle.retain(|joint| loops.is_still(&start, joint));
+    if found.is_empty() && idle.is_empty() {
+        return none;
     }
-    let Some(way) = loops.free_way(&basis) else { return BTreeSet::new() };
+    let Some(way) = loops.free_way(&basis) else { return none };
     for size in MOVES {
-        let Some(there) = loops.moved(&start, &way, size) else { return BTreeSet::new() };
-        let (dependent, _) = loops.dependent(&there);
-        found.retain(|row| dependent.contains(row));
+        let Some(there) = loops.moved(&start, &way, size) else { return none };
+        if !found.is_empty() {
+            let (dependent, _) = loops.dependent(&there);
+            found.retain(|row| dependent.contains(row));
+        }
+        idle.retain(|joint| loops.is_still(&there, joint));
     }
-    found.into_iter().map(|row| numbers[row]).collect()
+    let idle = idle.into_iter().flat_map(|joint| joint.own.into_iter().map(|own| own.0)).collect();
+    (found.into_iter().map(|row| numbers[row]).collect(), idle)
+}
+
+/// How one thing that moves acts on the constraints of one joint.
+struct Acting {
+    /// By which transformers, with their moduli.
+    own: Vec<(ElementId, Expr)>,
+    /// The moduli by which all else acts on the joint.
+    all: Vec<Expr>,
+}
+
+/// All that acts through transformers on constraints, joint by joint.
+fn acting(graph: &BondGraph, constraints: &[usize]) -> Vec<Acting> {
+    let mut joints: BTreeMap<&str, BTreeMap<ElementId, Vec<(ElementId, Expr)>>> = BTreeMap::new();
+    let neighbours = |element: ElementId| {
+        let bonds = graph.elements[element].ports.iter().map(|port| &graph.bonds[port.bond]);
+        bonds.map(move |bond| if bond.from.element == element { bond.to.element } else { bond.from.element })
+    };
+    for constraint in constraints.iter().map(|&c| &graph.constraints[c]).filter(|c| !c.drawn) {
+        // Those that stand in one component, or beside each other in the model.
+        let joint = constraint.name.rsplit_once('.').map_or("", |(joint, _)| joint);
+        for node in neighbours(constraint.element) {
+            for transformer in neighbours(node) {
+                let Kind::Transformer { modulus } = graph.elements[transformer].kind else { continue };
+                let what = neighbours(transformer).find(|&end| end != node);
+                joints.entry(joint).or_default().entry(what.unwrap_or(node)).or_default().push((transformer, modulus));
+            }
+        }
+    }
+    let of_joint = |joint: BTreeMap<ElementId, Vec<(ElementId, Expr)>>| {
+        let all: Vec<Expr> = joint.values().flatten().map(|own| own.1).collect();
+        joint.into_values().map(move |own| Acting { own, all: all.clone() }).collect::<Vec<_>>()
+    };
+    joints.into_values().flat_map(of_joint).collect()
 }
 
 /// The rate of a position, as an expression.
@@ -97,6 +145,12 @@ impl Loops<'_> {
         self.constraints.iter().map(|&e| self.at(values, e)).collect()
     }
 
+    /// Whether what acts on a joint does not move it at a position.
+    fn is_still(&self, values: &Map<Symbol, f64>, joint: &Acting) -> bool {
+        let most = joint.all.iter().map(|&e| self.at(values, e).abs()).fold(0.0, f64::max);
+        joint.own.iter().all(|&(_, e)| self.at(values, e).abs() <= STILL * most)
+    }
+
     fn jacobian(&self, values: &Map<Symbol, f64>) -> Vec<Vec<f64>> {
         let sum = |slopes: &Vec<Expr>| slopes.iter().map(|&e| self.at(values, e)).sum();
         self.slopes.iter().map(|row| row.iter().map(sum).collect()).collect()
@@ -106,12 +160,15 @@ impl Loops<'_> {
     fn dependent(&self, values: &Map<Symbol, f64>) -> (BTreeSet<usize>, Vec<Vec<f64>>) {
         let mut found = BTreeSet::new();
         let mut basis: Vec<Vec<f64>> = Vec::new();
-        for (number, mut row) in self.jacobian(values).into_iter().enumerate() {
+        let rows = self.jacobian(values);
+        let most = rows.iter().map(|row| length(row)).fold(0.0, f64::max);
+        for (number, mut row) in rows.into_iter().enumerate() {
             let before = length(&row);
             take_off(&mut row, &basis);
             let after = length(&row);
             // Where no slope is left the constraint is in a singular position by itself.
-            if before > 0.0 && after <= DEPENDENT * before {
+            if before > 0.0 && (after <= DEPENDENT * before || before <= STILL * most) {
+                // What is left of slopes that are rounding, as those of parallel axes are, is no direction.
                 found.insert(number);
             } else if after > 0.0 {
                 row.iter_mut().for_each(|v| *v /= after);

@@ -22,6 +22,13 @@ impl Tracer<'_> {
         (0..cycle.len()).map(edge).collect()
     }
 
+    /// Whether these signals follow each other along edges. The dual of a cycle does not where an entry of an inverse is known
+    /// to be 0 for one kind of variables alone.
+    fn is_cycle(&self, cycle: &[NodeId]) -> bool {
+        let before = |i: usize| cycle[(i + cycle.len() - 1) % cycle.len()];
+        (0..cycle.len()).all(|i| self.signals.edge(before(i), cycle[i]).is_some())
+    }
+
     /// Class 2, 3 or 4 of a cycle of algebraic edges.
     ///
     /// Class 4 if it stays inside the junction structure, 3 if it passes the law of one port only, else 2. A cycle
@@ -131,8 +138,11 @@ fn dual(cycle: &[NodeId]) -> Vec<NodeId> {
 }
 
 /// Of a cycle inside the junction structure and its dual the one along efforts, or along more of them.
-fn effort_turn(cycle: &[NodeId]) -> Vec<NodeId> {
+fn effort_turn(cycle: &[NodeId], tracer: &Tracer) -> Vec<NodeId> {
     let (cycle, dual) = (canonical(cycle), dual(cycle));
+    if !tracer.is_cycle(&dual) {
+        return cycle;
+    }
     let efforts = |cycle: &[NodeId]| cycle.iter().filter(|node| node.is_effort()).count();
     match efforts(&cycle).cmp(&efforts(&dual)) {
         std::cmp::Ordering::Less => dual,
@@ -145,7 +155,7 @@ fn effort_turn(cycle: &[NodeId]) -> Vec<NodeId> {
 pub(super) fn without_duals(cycles: Vec<Vec<NodeId>>, tracer: &Tracer) -> Vec<Vec<NodeId>> {
     let turned = |cycle: Vec<NodeId>| {
         let inner = tracer.class(&tracer.edges(&cycle)) == 4;
-        if inner { effort_turn(&cycle) } else { canonical(&cycle) }
+        if inner { effort_turn(&cycle, tracer) } else { canonical(&cycle) }
     };
     let distinct: BTreeSet<Vec<NodeId>> = cycles.into_iter().map(turned).collect();
     distinct.into_iter().collect()

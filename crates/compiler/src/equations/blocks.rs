@@ -104,7 +104,8 @@ fn put_in(d: &mut Definitions, symbols: &[Symbol], zeros: &BTreeMap<Symbol, Expr
     changed
 }
 
-fn is_direct(d: &Definitions, symbol: Symbol) -> bool {
+/// Whether the definition of a symbol gives its value without reading it.
+pub(super) fn is_direct(d: &Definitions, symbol: Symbol) -> bool {
     match d.of[&symbol] {
         Definition::Explicit(e) => !d.x.depends_on(e, symbol),
         Definition::Implicit(_) => false,

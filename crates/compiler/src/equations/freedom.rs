@@ -7,8 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::InitialCondition;
+use super::blocks::{components, is_direct};
 use super::definitions::{Definition, Definitions};
 use super::independent_rows::{IndependentRows, Row, equilibrate};
+use super::points::solved;
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
 use crate::bond_graph::{Guess, Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
@@ -22,6 +24,13 @@ pub(super) struct Sum {
 
 /// A time at which no source is zero by chance.
 const SOME_TIME: f64 = 0.7361;
+/// Of more variables that define each other no values are sought where slopes are taken.
+const MOST_TOGETHER: usize = 64;
+/// Slopes of a loop below this part of its greatest one are rounding.
+const IDLE: f64 = 1e-9;
+/// Newton's iterations for them, and by which part they may still move.
+const ITERATIONS: usize = 8;
+const CLOSE: f64 = 1e-12;
 
 /// The conditions that are missing: `storage = 0`, or its guess. `given` is what the start has to satisfy anyway.
 pub(super) fn conditions(
@@ -185,6 +194,58 @@ impl Freedom {
         self.open.iter().map(|&s| (s, find(&mut leader, s))).collect()
     }
 
+    /// Moves the point where slopes are taken to what definitions make of it: of moduli that several rows share, of gains of
+    /// loops, and of all that is not open. Read as 1, they would let independent rows of a rotation look dependent.
+    fn follow_definitions(&mut self, d: &Definitions, x: &mut Exprs) {
+        self.point.set([]);
+        let follows = |s: &Symbol| {
+            d.of.contains_key(s) && !is_unknown(d, *s) && (d.meaning(*s).is_none() || !self.open.contains(s))
+        };
+        let symbols: Vec<Symbol> = self.reads.iter().map(|r| r.0).filter(follows).collect();
+        for together in components(d, &symbols) {
+            match together[..] {
+                [only] if is_direct(d, only) => {
+                    let value = self.point.value(x, d.of[&only].expr());
+                    self.point.place(only, value);
+                }
+                _ => self.follow_loop(d, x, &together),
+            }
+        }
+    }
+
+    /// The same for what is defined by each other: linear equations, or Newton's method from where it is.
+    fn follow_loop(&mut self, d: &Definitions, x: &mut Exprs, together: &[Symbol]) {
+        let n = together.len();
+        if n > MOST_TOGETHER {
+            return;
+        }
+        for _ in 0..ITERATIONS {
+            let (mut matrix, mut missed) = (vec![0.0; n * n], vec![0.0; n]);
+            for (row, &symbol) in together.iter().enumerate() {
+                let definition = d.of[&symbol];
+                let own = matches!(definition, Definition::Explicit(_));
+                let value = self.point.value(x, definition.expr());
+                missed[row] = value - if own { self.point.of(symbol) } else { 0.0 };
+                for (column, &by) in together.iter().enumerate() {
+                    let slope = x.derivative(definition.expr(), by);
+                    let slope = self.point.value(x, slope);
+                    matrix[row * n + column] = slope - f64::from(u8::from(own && row == column));
+                }
+            }
+            let step = solved(n, matrix, missed);
+            if !step.iter().all(|s| s.is_finite()) {
+                return;
+            }
+            let moved: Vec<(Symbol, f64)> =
+                together.iter().zip(&step).map(|(&s, v)| (s, self.point.of(s) - v)).collect();
+            let arrived = moved.iter().zip(&step).all(|((_, at), step)| step.abs() <= CLOSE * (1.0 + at.abs()));
+            self.point.set(moved);
+            if arrived {
+                return;
+            }
+        }
+    }
+
     /// The storages whose being empty is independent of definitions, of what is given, and of the storages before them.
     fn independent(
         &mut self,
@@ -193,6 +254,7 @@ impl Freedom {
         given: &[InitialCondition],
     ) -> Vec<(Symbol, Expr)> {
         let mut x = d.x.clone();
+        self.follow_definitions(d, &mut x);
         let mut rows = Vec::new();
         let mut own = Vec::new();
         for (symbol, _) in self.reads.iter().filter(|r| self.open.contains(&r.0)) {
@@ -204,8 +266,13 @@ impl Freedom {
             rows.push(row);
             own.push(Some(*symbol));
         }
+        let closing: BTreeSet<Expr> = d.graph.constraints.iter().filter(|c| c.holonomic).map(|c| c.expr).collect();
         for condition in given {
-            rows.push(slopes(&mut x, condition.residual, &self.open, &mut self.point));
+            let mut row = slopes(&mut x, condition.residual, &self.open, &mut self.point);
+            if closing.contains(&condition.residual) {
+                leave_out_what_is_idle(&mut row);
+            }
+            rows.push(row);
             own.push(None);
         }
         rows.extend(wanted.iter().map(|&(s, _)| Row::from([(s, 1.0)])));
@@ -300,6 +367,13 @@ fn slopes(x: &mut Exprs, e: Expr, open: &BTreeSet<Symbol>, point: &mut NumericPo
         Some(point.value(x, slope)).filter(|v| v.is_finite()).unwrap_or(1.0)
     };
     read.into_iter().map(|s| (s, slope(s))).collect()
+}
+
+/// What does not move a closed loop where it stands is not determined by it, as the angle of a rod about the ball at its end: its
+/// slope is rounding there.
+fn leave_out_what_is_idle(row: &mut Row) {
+    let most = row.values().fold(0.0f64, |most, v| most.max(v.abs()));
+    row.retain(|_, v| v.abs() > IDLE * most);
 }
 
 /// The least symbol of those that hang together with one, with the way to it shortened.

@@ -140,8 +140,8 @@ fn row(assembled: &mut Assembled, graph: &BondGraph, constraint: usize, candidat
     (!slopes.is_empty()).then_some(Row { constraint, slopes })
 }
 
-/// Which positions are computed: those first whose rate is no kept speed and not imposed, by the size of their slopes at the
-/// start.
+/// Which positions are computed: those first whose rate is no kept speed, last those whose rate is imposed, by the size of their
+/// slopes at the start.
 fn chosen(
     assembled: &Assembled,
     graph: &BondGraph,
@@ -151,14 +151,17 @@ fn chosen(
     let x = &assembled.d.x;
     let mut point = start_point(x, graph);
     let mut open: Vec<BTreeMap<usize, f64>> = rows.iter().map(|row| numbers(assembled, row, &mut point)).collect();
-    let follows: Vec<bool> = candidates.iter().map(|c| !is_speed(assembled, c.symbol, sources)).collect();
+    let kinds: Vec<Speed> = candidates.iter().map(|c| speed(assembled, c.symbol, sources)).collect();
+    // Where a run goes on no source lets go of what it moves: at its limit the machine stops.
+    let classes = [Speed::Dependent, Speed::Kept, Speed::Imposed];
+    let classes = if graph.point.is_some() { &classes[..2] } else { &classes };
     let mut chosen = BTreeSet::new();
-    for class in [true, false] {
+    for &class in classes {
         loop {
             let mut best: Option<(f64, usize, usize)> = None;
             for (r, row) in open.iter().enumerate() {
                 let most = row.values().fold(0.0f64, |most, v| most.max(v.abs()));
-                for (&column, v) in row.iter().filter(|(c, _)| follows[**c] == class) {
+                for (&column, v) in row.iter().filter(|(c, _)| kinds[**c] == class) {
                     let share = v.abs() / most;
                     if share >= SMALL && best.is_none_or(|b| share > b.0) {
                         best = Some((share, r, column));
@@ -193,17 +196,32 @@ fn subtract(row: &mut BTreeMap<usize, f64>, pivot: &BTreeMap<usize, f64>, column
     }
 }
 
-/// Whether a state integrates a speed that is a state itself, or that a source imposes.
-fn is_speed(assembled: &Assembled, position: Symbol, sources: &BTreeSet<Symbol>) -> bool {
+/// What a position integrates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Speed {
+    /// What follows from states.
+    Dependent,
+    /// A state.
+    Kept,
+    /// What a source imposes.
+    Imposed,
+}
+
+fn speed(assembled: &Assembled, position: Symbol, sources: &BTreeSet<Symbol>) -> Speed {
     let d = &assembled.d;
     let mut rate = d.states[&position];
-    while !d.states.contains_key(&rate) && !sources.contains(&rate) {
+    loop {
+        if sources.contains(&rate) {
+            return Speed::Imposed;
+        }
+        if d.states.contains_key(&rate) {
+            return Speed::Kept;
+        }
         match d.of.get(&rate).map(|of| (of, d.x.node(of.expr()))) {
             Some((Definition::Explicit(_), &Node::Symbol(symbol))) => rate = symbol,
-            _ => return false,
+            _ => return Speed::Dependent,
         }
     }
-    true
 }
 
 /// Each chosen position with the row that defines it: a row that reads it. `None` if there are not as many.

@@ -47,6 +47,11 @@ impl Bounds {
 }
 
 impl Program {
+    /// The branch of each set-valued law in which the program holds.
+    pub fn branches(&self) -> Vec<u32> {
+        self.set_valued.iter().map(|law| law.present).collect()
+    }
+
     /// Where the branches of the set-valued laws end; `None` if there are no such laws, or another form looks for their ends.
     pub fn bounds(&self) -> Option<Bounds> {
         if self.clauses.iter().all(|clause| clause.bound.is_none()) {
@@ -57,8 +62,7 @@ impl Program {
         let groups: Vec<[usize; 2]> = (0..self.set_valued.len())
             .map(|law| [Measure::Effort, Measure::Flow].map(|measure| self.group(law, measure, &mut kinds)))
             .collect();
-        let mut bounds =
-            Bounds { branches: self.set_valued.iter().map(|law| law.present).collect(), ..Bounds::default() };
+        let mut bounds = Bounds { branches: self.branches(), ..Bounds::default() };
         let mut numbers = vec![0; self.set_valued.len()];
         let mut place = 0;
         for (clause, c) in self.clauses.iter().enumerate() {

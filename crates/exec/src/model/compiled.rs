@@ -44,8 +44,21 @@ pub struct Compiled {
 #[derive(Debug, Default)]
 struct Others {
     modes: Vec<Arc<Mode>>,
-    /// The mode with these branches in which these stay independent; `None` where there is none.
-    of: BTreeMap<(Vec<u32>, Vec<Symbol>), Option<ModeId>>,
+    /// The mode that this is asked of; `None` where there is none.
+    of: BTreeMap<Key, Option<ModeId>>,
+    /// Determinants of the equations of computed positions where a mode was entered first, as logarithms.
+    determinants: BTreeMap<ModeId, Vec<f64>>,
+}
+
+/// What a mode is looked up by.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    /// Branches of set-valued laws.
+    branches: Vec<u32>,
+    /// What stays independent.
+    independent: Vec<Symbol>,
+    /// What its states tell, where that was decided at a point.
+    told: Option<Vec<Symbol>>,
 }
 
 impl Compiled {
@@ -108,8 +121,26 @@ impl Compiled {
         wanted: &[Symbol],
         point: &BTreeMap<Symbol, f64>,
     ) -> Option<ModeId> {
-        let branches = present.program.set_valued.iter().map(|law| law.present).collect();
-        self.mode_of((branches, wanted.to_vec()), point)
+        let branches = present.program.branches();
+        self.mode_of(Key { branches, independent: wanted.to_vec(), told: None }, point)
+    }
+
+    /// The mode in which the branches of `present` hold, these variables stay independent, and positions follow from others as
+    /// is best at a point. `None` if they do so in `present`.
+    pub(super) fn decided_at(
+        &self,
+        point: &BTreeMap<Symbol, f64>,
+        present: &Mode,
+        independent: Vec<Symbol>,
+    ) -> Option<ModeId> {
+        let branches = present.program.branches();
+        let program = self.fitting(self.alternatives.as_ref()?.program(&branches, &independent, point))?;
+        if program.tracked == present.program.tracked {
+            return None;
+        }
+        let key = Key { branches, independent, told: Some(program.tracked.clone()) };
+        let known = self.others().of.get(&key).copied();
+        known.unwrap_or_else(|| self.added(key, Some(program)))
     }
 
     /// The mode in which set-valued laws have these branches, made if it is not there yet.
@@ -117,7 +148,8 @@ impl Compiled {
         if self.first.program.set_valued.iter().map(|law| law.present).eq(branches.iter().copied()) {
             return Some(ModeId::default());
         }
-        self.mode_of((branches.to_vec(), Vec::new()), &BTreeMap::new())
+        let key = Key { branches: branches.to_vec(), independent: Vec::new(), told: None };
+        self.mode_of(key, &BTreeMap::new())
     }
 
     /// The mode in which set-valued laws have these branches and the variables stay independent that `present` was entered
@@ -128,25 +160,38 @@ impl Compiled {
         branches: &[u32],
         point: &BTreeMap<Symbol, f64>,
     ) -> Option<ModeId> {
-        let entered =
-            |(key, mode): (&(Vec<u32>, Vec<Symbol>), &Option<ModeId>)| (*mode == Some(present)).then(|| key.1.clone());
+        let entered = |(key, mode): (&Key, &Option<ModeId>)| (*mode == Some(present)).then(|| key.independent.clone());
         let wanted = self.others().of.iter().find_map(entered).filter(|wanted| !wanted.is_empty());
-        let mode = wanted.and_then(|wanted| self.mode_of((branches.to_vec(), wanted), point));
+        let key = |independent| Key { branches: branches.to_vec(), independent, told: None };
+        let mode = wanted.and_then(|wanted| self.mode_of(key(wanted), point));
         mode.or_else(|| self.in_mode(branches))
     }
 
-    fn mode_of(&self, key: (Vec<u32>, Vec<Symbol>), point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
+    /// Puts determinants of a mode where it was entered first in the place of those where it has been entered now.
+    pub(super) fn compare_with(&self, mode: ModeId, now: &mut Vec<f64>) {
+        let mut others = self.others();
+        now.clone_from(others.determinants.entry(mode).or_insert_with(|| now.clone()));
+    }
+
+    fn mode_of(&self, key: Key, point: &BTreeMap<Symbol, f64>) -> Option<ModeId> {
         if let Some(known) = self.others().of.get(&key) {
             return *known;
         }
+        let program = self.fitting(self.alternatives.as_ref()?.program(&key.branches, &key.independent, point));
+        self.added(key, program)
+    }
+
+    /// A program with as many states as all modes have; `None` if it does not fit.
+    fn fitting(&self, program: Option<Program>) -> Option<Program> {
         let states = self.first.program.states.len();
-        let alternatives = self.alternatives.as_ref()?;
-        let program = alternatives.program(&key.0, &key.1, point);
         let fits = |p: &Program| p.states.len() == states || !p.set_valued.is_empty() && p.states.len() < states;
-        let program = match alternatives.most_states() {
+        match self.alternatives.as_ref()?.most_states() {
             Some(_) => program.filter(fits).map(|program| program.with_idle_states(states)),
             None => program,
-        };
+        }
+    }
+
+    fn added(&self, key: Key, program: Option<Program>) -> Option<ModeId> {
         let mode = program.map(|program| Mode::of(program, &self.first));
         let mut others = self.others();
         let id = mode.map(|mode| {
@@ -217,7 +262,8 @@ impl Mode {
         let derivatives = entries.iter().flatten().map(|e| e.value);
         let kept = program.position_relations.iter().flat_map(|r| r.values());
         // Where branches end, or others become independent, all variables of the graph are taken over into the next mode.
-        let changes = later || !program.set_valued.is_empty() || !program.exchanges.independent.is_empty();
+        let exchanged = !program.exchanges.independent.is_empty() || !program.positions.is_empty();
+        let changes = later || !program.set_valued.is_empty() || exchanged;
         let carried = program.variables.values().copied().filter(|_| changes);
         let more: Vec<Value> = derivatives.chain(program.relations.values()).chain(kept).chain(carried).collect();
         let layout = Layout::new(&program, &more);

@@ -24,6 +24,9 @@ const NEAR: f64 = 1.1;
 const ROUNDING: f64 = 1e-12;
 /// Ratios are looked at where what they are divided by has come to less than this part of what it was when they were last.
 const SMALLER: f64 = 0.95;
+/// Which positions follow from others is decided anew where the determinant of their equations has come to a tenth, as a
+/// logarithm to base 2.
+const TURNING: f64 = 3.33;
 const ITERATIONS: usize = 20;
 
 /// The ratios between variables that could be independent and those that are.
@@ -64,12 +67,64 @@ impl Model {
     /// Whether a run may go on in another mode: in other independent variables, or with other branches of set-valued laws.
     pub fn may_change_mode(&self) -> bool {
         let first = self.compiled.first();
-        self.compiled.has_alternatives() && (first.exchanges.is_some() || first.bounds.is_some())
+        let may = first.exchanges.is_some() || first.bounds.is_some() || !first.program.positions.is_empty();
+        self.compiled.has_alternatives() && may
     }
 
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
     /// position and motion in the new ones. `failed`: a step from here has failed.
     pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        if self.exchange_speeds(t, x, failed)? {
+            return Ok(true);
+        }
+        Ok(self.positions_turn() && self.exchange_positions(t, x)?)
+    }
+
+    /// Whether the equations of computed positions have come near to being singular, as where a position turns round that
+    /// follows from others.
+    fn positions_turn(&mut self) -> bool {
+        let code = self.code.clone();
+        let Some(motion) = code.motion.as_ref().filter(|_| self.compiled.has_alternatives()) else { return false };
+        let Model { frame, run, compiled, .. } = self;
+        let now = motion.blocks.iter().map(|(block, _)| frame.solvers[block.0 as usize].factors.log_determinant());
+        if run.determinants.is_empty() {
+            run.determinants.extend(now.clone());
+            compiled.compare_with(run.mode, &mut run.determinants);
+        }
+        let mut turn = false;
+        for (now, before) in now.zip(&mut run.determinants) {
+            turn |= now < *before - TURNING;
+            // What is not known at first counts from when it is.
+            if now > *before || now < *before - TURNING || !before.is_finite() {
+                *before = now;
+            }
+        }
+        turn
+    }
+
+    /// Where positions that follow from others turn round, as the fourth number of a quaternion does, others have to follow:
+    /// which ones do is decided anew at `(t, x)`.
+    fn exchange_positions(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
+        let code = self.code.clone();
+        if code.program.positions.is_empty() || !self.compiled.has_alternatives() {
+            return Ok(false);
+        }
+        let independent = code.exchanges.iter().flat_map(|ratios| ratios.independent.iter().map(|e| e.symbol));
+        // What is looked at on the way may lead the next solutions elsewhere.
+        let (before, at) = (self.clone(), x.to_vec());
+        let values = self.values_of_all(t, x)?;
+        let exchanged = match self.compiled.decided_at(&values, &code, independent.collect()) {
+            Some(mode) => self.go_over(mode, t, x, &values)?,
+            None => false,
+        };
+        if !exchanged {
+            *self = before;
+            x.copy_from_slice(&at);
+        }
+        Ok(exchanged)
+    }
+
+    fn exchange_speeds(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
         let code = self.code.clone();
         let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else {
             return Ok(false);
@@ -88,10 +143,23 @@ impl Model {
             return Ok(false);
         };
         let values = self.values_of_all(t, x)?;
-        let Some(mode) = self.compiled.with_independent(&code, &wanted, &values) else { return Ok(false) };
+        match self.compiled.with_independent(&code, &wanted, &values) {
+            Some(mode) => self.go_over(mode, t, x, &values),
+            None => Ok(false),
+        }
+    }
+
+    /// Goes on in a mode with the same position and motion; `false`, with nothing changed, if it cannot tell them.
+    fn go_over(
+        &mut self,
+        mode: ModeId,
+        t: f64,
+        x: &mut [f64],
+        values: &BTreeMap<Symbol, f64>,
+    ) -> Result<bool, Failure> {
         let drifted = self.drift_before(t, x)?;
         let (before, at) = (self.clone(), x.to_vec());
-        let changed = self.enter_at(mode, t, x, &values, before.recorded.chosen.len());
+        let changed = self.enter_at(mode, t, x, values, before.recorded.chosen.len());
         match changed {
             Ok(true) => self.keep_anew(drifted, t, x).map(|()| true),
             // Nothing has changed then.
@@ -219,6 +287,8 @@ impl Model {
         run.mode = mode;
         run.floors = vec![0.0; code.program.conditions.len()];
         run.pivots.clear();
+        run.determinants.clear();
+        run.determinants.reserve(code.motion.as_ref().map_or(0, |motion| motion.blocks.len()));
         run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();

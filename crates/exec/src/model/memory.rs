@@ -60,6 +60,8 @@ pub(super) struct Remembered {
     pub floors: Vec<f64>,
     /// What ratios between variables were divided by when it was last seen whether others should be independent.
     pub pivots: Vec<f64>,
+    /// For each block of computed positions the greatest determinant of its equations since it was looked at, as a logarithm.
+    pub determinants: Vec<f64>,
     /// What relations between positions keep.
     pub kept: Kept,
     /// Conditions that have made something happen and are about to hold no longer.

@@ -145,6 +145,7 @@ impl Model {
             returns: Vec::with_capacity(code.clauses.conditional.len()),
             floors: vec![0.0; code.program.conditions.len()],
             pivots: Vec::new(),
+            determinants: Vec::new(),
             kept: Kept::default(),
             pieces: vec![None; code.program.inputs.len()],
         };

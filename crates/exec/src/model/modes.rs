@@ -192,7 +192,7 @@ impl Model {
         most_sets: usize,
     ) -> Option<Vec<ModeProgram>> {
         let all = self.combinations(most)?;
-        let present: Vec<u32> = self.code.program.set_valued.iter().map(|law| law.present).collect();
+        let present: Vec<u32> = self.code.program.branches();
         let others = all.iter().filter(|branches| **branches != present);
         let point = self.values_of_all(t, x).unwrap_or_default();
         let mut modes = Vec::new();

@@ -212,6 +212,14 @@ impl Lu {
         }
     }
 
+    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix.
+    pub fn log_determinant(&self) -> f64 {
+        match self.definite {
+            true => -self.scale.iter().map(|inverse| inverse.abs().log2()).sum::<f64>(),
+            false => (0..self.size).map(|k| self.factors[k * self.size + k].abs().log2()).sum(),
+        }
+    }
+
     /// Whether the determinant of the factored matrix is above zero.
     pub fn is_positive(&self) -> bool {
         let n = self.size;

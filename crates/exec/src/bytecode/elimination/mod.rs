@@ -78,6 +78,14 @@ impl Factors {
         }
     }
 
+    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix; NaN where it is not known.
+    pub fn log_determinant(&self) -> f64 {
+        match self {
+            Factors::Full(lu, _) => lu.log_determinant(),
+            Factors::Sparse(lu) => lu.log_determinant(),
+        }
+    }
+
     /// Whether the determinant of the factored matrix is above zero.
     pub fn is_positive(&self) -> bool {
         match self {

@@ -148,6 +148,16 @@ impl SparseLu {
         lu.factor()
     }
 
+    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix; NaN where rows have been exchanged
+    /// or the matrix is definite, whose pivots are not looked at.
+    pub fn log_determinant(&self) -> f64 {
+        match self.factored {
+            Factored::Full => self.full.as_ref().map_or(f64::NAN, |lu| lu.log_determinant()),
+            Factored::Sparse => -self.inverse.iter().map(|inverse| inverse.abs().log2()).sum::<f64>(),
+            Factored::Definite | Factored::Exchanged => f64::NAN,
+        }
+    }
+
     /// Replaces `b` by the solution. The matrix must have been factored.
     pub fn solve(&mut self, b: &mut [f64]) {
         match self.factored {

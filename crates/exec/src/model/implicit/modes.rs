@@ -33,7 +33,7 @@ impl ImplicitModel {
         if !self.has_modes() {
             return Ok(false);
         }
-        let branches: Vec<u32> = self.reference.code.program.set_valued.iter().map(|law| law.present).collect();
+        let branches: Vec<u32> = self.reference.code.program.branches();
         let before = self.form.run.mode;
         let Some(mode) = self.form.compiled.in_mode(&branches) else {
             return Err(self.no_form(t, "this form has no equations there".into()));
