@@ -4,7 +4,7 @@ use halfarrow_compiler::equations::{EquationStep, Equations, Form};
 use serde::Serialize;
 
 use super::subject::{Common, Subject, is_over};
-use super::{Budget, Compare, Progress, REFERENCE, Row, check, short};
+use super::{Budget, Compare, Progress, Row, check, short};
 use crate::clock::ProcessorTime;
 use crate::error::Error;
 use crate::model::Model;
@@ -70,7 +70,7 @@ impl ComparedForms<'_> {
 
     fn add(&mut self, form: Form) {
         let mut row = Row::of(form);
-        let made = match is_over(self.budget.part(REFERENCE)) {
+        let made = match is_over(self.budget.part(1.0)) {
             true => Err(LEFT_OUT.to_string()),
             false => self.compiled(form, &mut row).map_err(|error| short(&error)),
         };
