@@ -59,7 +59,7 @@ def main():
             "seconds_by_radau"] and rows["minimal"]["seconds_by_radau"] else None
         number = lambda v, shape: "–" if v is None else format(v, shape)
         worst = max((r["max_error"] for f, r in rows.items() if r["max_error"] is not None and f != "stiff"), default=None)
-        reference = found["reference"]
+        reference = found["reference"] or {"confirmed_by": "–", "confirmed_to": None}
         detail.append([model, f"{found['to']:g}", rows["minimal"]["solver"], number(radau("break"), ".1f"),
                        number(radau("lagrange"), ".1f"), number(rows.get("stiff", {}).get("order"), ".2f"),
                        number(worst, ".0e"), str(reference["confirmed_by"]), number(reference["confirmed_to"], ".0e")])

@@ -70,7 +70,9 @@ mod watch;
 pub use animation::{Body, Curve, FRAMES_PER_SECOND, Form as BodyForm, Link, Mesh, Scene};
 pub use audited::{AuditReport, Deviation};
 pub use check::CheckReport;
-pub use compare::{Compare, CompareReport, Convergence, OperationsReport, ReferenceReport, Row, TimedRun};
+pub use compare::{
+    Compare, CompareReport, ComparedForms, Convergence, OperationsReport, ReferenceReport, Row, SolvedBlocks, TimedRun,
+};
 pub use compiled::Compiled;
 pub use components::{Component, Entry, Library};
 pub use draw::{NamedRuns, Picture};

@@ -498,7 +498,15 @@ impl Model {
 
     /// A form beside the minimal one.
     pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
-        let minimal = self.system(&self.equations_in(Form::Minimal)?)?;
+        self.form_beside(equations, self.system(&self.equations_in(Form::Minimal)?)?)
+    }
+
+    /// The same beside a minimal form that is there already.
+    pub(crate) fn form_beside(
+        &self,
+        equations: &Equations,
+        minimal: exec::Model,
+    ) -> Result<exec::ImplicitModel, Error> {
         let program = self.program_of(equations);
         let code = || match self.graph.set_valued.is_empty() {
             true => exec::ImplicitModel::new(program, minimal),
@@ -897,7 +905,7 @@ pub(crate) fn set_spring_rate(system: &mut exec::ImplicitModel, x: &[f64]) -> Re
 }
 
 /// Connects the inputs of a run, and sets the springs that it asks for.
-fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
+pub(crate) fn set_up(system: &mut exec::ImplicitModel, run: &Run) -> Result<(), Problem> {
     connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
     set_spring(system, ParameterKind::SpringStiffness, "stiffness", run.stiffness)?;
     set_spring(system, ParameterKind::SpringDamping, "damping", run.damping)

@@ -25,7 +25,7 @@ fn row(report: &CompareReport, form: Form) -> &Row {
 fn every_form_has_a_row_whose_numbers_hold() {
     let report = compared("pendulum", 2.0);
     let model = load("pendulum");
-    assert!(report.reference.confirmed_to < 1e-9, "{:?}", report.reference);
+    assert!(report.reference.as_ref().is_some_and(|r| r.confirmed_to < 1e-9), "{:?}", report.reference);
     let forms: Vec<&str> = report.rows.iter().map(|row| row.form.name()).collect();
     assert_eq!(forms, ["minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff"]);
     for row in &report.rows {

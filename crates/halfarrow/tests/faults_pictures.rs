@@ -44,14 +44,7 @@ fn comparing_keeps_to_its_budget() {
     let model = load("../../models/slider_crank/model.bond");
     let begun = Instant::now();
     let wanted = Compare { to: Some(5.0), error: 1e-9, budget: Some(1.0), ..Compare::default() };
-    let report = match model.compare(&wanted, &mut |_, _| true) {
-        Ok(report) => report,
-        // A machine that is busy with other things may not even come to the reference.
-        Err(Error::Usage(Problem::BadOption { reason })) => {
-            return assert!(reason.contains("give more time"), "{reason}");
-        }
-        Err(error) => panic!("{}", error.render(false)),
-    };
+    let report = model.compare(&wanted, &mut |_, _| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let without = report.rows.iter().filter(|row| row.seconds_per_second.is_none()).count();
     assert!(without == 0 || report.notes.iter().any(|n| n.contains("was given 1 s")), "{:?}", report.notes);
     assert!(begun.elapsed().as_secs_f64() < 60.0, "{:?}", begun.elapsed());

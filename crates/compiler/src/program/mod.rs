@@ -513,7 +513,7 @@ impl Matrix {
 
 impl Program {
     /// The block whose factors serve this one.
-    pub(crate) fn shared(&self, block: BlockId) -> Option<BlockId> {
+    pub fn factors_of(&self, block: BlockId) -> Option<BlockId> {
         let Block::Linear { shared: Some(solution), .. } = self.blocks[block] else { return None };
         let Op::Solution(block, _) = self.values.op(solution) else { panic!("factors are shared with a block") };
         Some(block)

@@ -207,6 +207,13 @@ impl Program {
         blocks.iter().flat_map(|&id| of_block(id)).collect()
     }
 
+    /// The unknowns of some blocks, of those that anything reads, in the order of [`Program::values`].
+    pub fn unknowns_of(&self, blocks: &[BlockId]) -> Vec<Value> {
+        let blocks: FxHashSet<BlockId> = blocks.iter().copied().collect();
+        let is_unknown = |op: Op| if let Op::Solution(block, _) = op { blocks.contains(&block) } else { false };
+        self.values.iter().filter(|(_, op)| is_unknown(*op)).map(|(value, _)| value).collect()
+    }
+
     /// The routine that computes the wanted values, in the order of [`Program::values`].
     pub fn routine(&self, wanted: &[Value]) -> Routine {
         Builder::new(self, false).build(wanted, &[])
@@ -442,7 +449,7 @@ impl<'a> Builder<'a> {
         let matrix = &program.blocks[block].matrix().values;
         let method = match &program.blocks[block] {
             Block::Linear { right, .. } => {
-                let (shared, right) = (program.shared(block), of(self, right));
+                let (shared, right) = (program.factors_of(block), of(self, right));
                 // Whoever shares no factors, or differentiates, forms a small matrix again.
                 let own = if shared.is_none() || matrix.size() <= SMALL { matrix.entries() } else { &[] };
                 Method::Linear { shared, matrix: of(self, own), right }

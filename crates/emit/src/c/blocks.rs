@@ -1,8 +1,9 @@
 //! Solve blocks in C: small symmetric ones written out, others by `lu.c`, nonlinear ones by `newton/`.
 
 use halfarrow_compiler::program::elimination::{Definite, is_written_out};
-use halfarrow_compiler::program::{Block, Method, Program, Reads, Solve};
+use halfarrow_compiler::program::{Block, BlockId, Method, Program, Reads, Solve};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeSet;
 
 use super::derivatives::Expressions;
 use super::patterns::FULL_AT_MOST;
@@ -29,11 +30,13 @@ pub(super) fn full_room(block: &Block) -> usize {
     if block.matrix().factors.is_none() || n <= FULL_AT_MOST { 2 * n * n } else { 0 }
 }
 
-/// Where linear blocks with a constant matrix keep their factors.
+/// Where linear blocks with a constant matrix keep their factors, and those whose factors serve others.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Factored {
     /// Number, first place and first place of the order of each such block.
     pub places: FxHashMap<u32, (usize, usize, usize)>,
+    /// First place and first place of the order of each block whose matrix varies and is that of others too.
+    pub lent: FxHashMap<u32, (usize, usize)>,
     /// Numbers taken in all.
     pub size: usize,
     /// Places of orders taken in all.
@@ -50,11 +53,21 @@ impl Factored {
             if n > 1 && matrix.values.entries().iter().all(|&v| program.values.reads(v) == Reads::PARAMETERS) {
                 let number = factored.places.len();
                 factored.places.insert(id.0, (number, factored.size, factored.orders));
-                factored.size += elimination_room(block, real);
-                factored.orders += n + usize::from(matrix.factors.is_some());
+                factored.take_room(block, real);
             }
         }
+        let lenders = program.blocks.ids().filter_map(|id| program.factors_of(id));
+        let lenders: BTreeSet<BlockId> = lenders.filter(|id| !factored.places.contains_key(&id.0)).collect();
+        for id in lenders.into_iter().filter(|id| program.blocks[*id].size() > 1) {
+            factored.lent.insert(id.0, (factored.size, factored.orders));
+            factored.take_room(&program.blocks[id], real);
+        }
         factored
+    }
+
+    fn take_room(&mut self, block: &Block, real: Real) {
+        self.size += elimination_room(block, real);
+        self.orders += block.size() + usize::from(block.matrix().factors.is_some());
     }
 }
 
@@ -70,23 +83,8 @@ impl Writer<'_> {
             self.definite(f, solve, a, number);
             return self.solved(f, solve, number);
         }
-        let (matrix, right) = a.split_at(solve.pattern.len());
         let (pattern, entries) = self.patterns.of_block(self.program, solve.block);
-        let (matrix, right) = (self.array(f, "a", number, matrix), self.array(f, "b", number, right));
-        let solution = self.room(f, "s", number, n);
-        let (call, factors) = match self.factored.places.get(&solve.block.0) {
-            Some((which, place, order)) => {
-                let function = needed("ha_linear_constant");
-                let call = written!("{}(m, {}, {}, {}, {}, {}", function, which, place, order, pattern, matrix);
-                (call, format!("m->factors + {place}, m->factors_order + {order}"))
-            }
-            None => {
-                let call = written!("{}(m, {}, {}", needed("ha_linear"), pattern, matrix);
-                (call, "m->work, m->order".to_string())
-            }
-        };
-        let unsolved = written!("!{}, {}, {})", call, right, solution);
-        f.lines.push(self.fail_if(&unsolved, "SINGULAR", &solve.block.0, f.shape.time));
+        let (factors, solution) = self.eliminated(f, solve, a, number, &pattern);
         if moves {
             let (matrix, right) = reads.rates.split_at(entries);
             let (matrix, right) = (self.rates(f, "da", number, matrix), self.rates(f, "db", number, right));
@@ -98,6 +96,46 @@ impl Writer<'_> {
             );
         }
         self.solved(f, solve, number);
+    }
+
+    /// Several equations, solved: where their factors stand, and the solution.
+    fn eliminated(
+        &self,
+        f: &mut Body,
+        solve: &Solve,
+        a: &[Written],
+        number: usize,
+        pattern: &Written,
+    ) -> (String, Variable) {
+        let (matrix, right) = a.split_at(a.len() - solve.unknowns.len());
+        let Factored { places, lent, .. } = &self.factored;
+        let at = |place: &usize, order: &usize| format!("m->factors + {place}, m->factors_order + {order}");
+        let lender = if let Method::Linear { shared, .. } = &solve.method { *shared } else { None };
+        let (constant, borrowed) = (places.get(&solve.block.0), lender.and_then(|lender| lent.get(&lender.0)));
+        if let (None, Some((place, order))) = (constant, borrowed) {
+            let (factors, right) = (at(place, order), self.array(f, "b", number, right));
+            let solution = self.room(f, "s", number, solve.unknowns.len());
+            let function = needed("ha_linear_borrowed");
+            f.line(written!("    {}({}, {}, {}, {});", function, factors, pattern, right, solution), 0);
+            return (factors, solution);
+        }
+        let (matrix, right) = (self.array(f, "a", number, matrix), self.array(f, "b", number, right));
+        let solution = self.room(f, "s", number, solve.unknowns.len());
+        let (call, factors) = match constant {
+            Some((which, place, order)) => {
+                let function = needed("ha_linear_constant");
+                let call = written!("{}(m, {}, {}, {}, {}, {}", function, which, place, order, pattern, matrix);
+                (call, at(place, order))
+            }
+            None => {
+                let lends = lent.get(&solve.block.0);
+                let factors = lends.map_or("m->work, m->order".to_string(), |(place, order)| at(place, order));
+                (written!("{}({}, {}, {}", needed("ha_linear"), factors, pattern, matrix), factors)
+            }
+        };
+        let unsolved = written!("!{}, {}, {})", call, right, solution);
+        f.lines.push(self.fail_if(&unsolved, "SINGULAR", &solve.block.0, f.shape.time));
+        (factors, solution)
     }
 
     /// Whether equations are written out where nothing moves: symmetric ones that are not too many.
@@ -213,7 +251,7 @@ impl Writer<'_> {
         let kind = self.real.kind();
         k.line(&written!("const {} a[] = {{{}}};", kind, Written::list(entries)), entries.len());
         k.line(&written!("const {} b[] = {{{}}};", kind, Written::list(right)), n);
-        k.line(&written!("if (!{}(m, {}, a, b, {})) {{", needed("ha_linear"), pattern, solution), 0);
+        k.line(&written!("if (!{}(m->work, m->order, {}, a, b, {})) {{", needed("ha_linear"), pattern, solution), 0);
         k.line(&written!("    return {};", failure), 0);
         k.line(&Written::of("}"), 0);
         k.indent = "        ";

@@ -311,6 +311,9 @@ fn of_blocks(list: &mut List, plan: &Plan) {
         let about = "solutions of Newton blocks, where they were found, their Jacobians";
         list.arrays(Kind::Real, &["memory"], s.memory, about);
         list.arrays(Kind::Int, &["following"], plan.newton.len(), "whether they are followed");
+        let about = "whether those found last and those followed are solutions where blocks read the same again";
+        list.arrays(Kind::Int, &["fresh", "settled"], plan.newton.len(), about);
+        list.some(Kind::Real, &["solutions"], plan.solutions, "");
         if !plan.sought_positions().is_empty() {
             let about = "whether the motion of positions is known, and their last way was short";
             list.arrays(Kind::Int, &["motion_known", "motion_short"], plan.newton.len(), about);
@@ -320,8 +323,9 @@ fn of_blocks(list: &mut List, plan: &Plan) {
         let [of_rates, of_shown] = plan.motion_sizes();
         list.some(Kind::Real, &["moves"], of_rates.max(of_shown), "their rates");
     }
-    if s.factored > 0 {
-        list.arrays(Kind::Real, &["factors"], s.factors, "of matrices of parameters alone");
+    if s.factors > 0 {
+        let about = "of matrices of parameters alone, and of those that several solve blocks have";
+        list.arrays(Kind::Real, &["factors"], s.factors, about);
         let sizes = [("factors_order", s.factors_order), ("factored", s.factored)];
         list.put(Kind::Int, sizes.map(|(name, size)| (name, Some(size.max(1)))).into(), "");
     }

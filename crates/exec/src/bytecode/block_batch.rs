@@ -260,7 +260,8 @@ impl Frame {
         for (members, memory) in group.members.chunks(LANES).zip(group.first..) {
             let follows = |m: &Member| {
                 let newton = &solvers[m.block].newton;
-                newton.following && newton.evaluation_limit / 4 > EVALUATIONS
+                let rests = newton.rests(m.outer.iter().map(|&outer| r[outer as usize]));
+                newton.following && newton.evaluation_limit / 4 > EVALUATIONS && !rests
             };
             if members.iter().filter(|m| follows(m)).count() < FEWEST {
                 continue;

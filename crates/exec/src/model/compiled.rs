@@ -218,11 +218,14 @@ pub(super) struct Mode {
     /// Computes what is assumed of parameters, each value with its scale.
     pub assumed: Routine,
     pub rates: Routine,
+    /// Computes the solutions of the Newton blocks that rates read, and no more, if there are any.
+    pub solutions: Option<Routine>,
     /// The Jacobian of the rates, if it is computed at once.
     pub jacobian: Option<JacobianCode>,
     pub sparsity: Sparsity,
-    /// Newton blocks of the rates that are solved together.
+    /// Newton blocks of the rates that are solved together, and of the solutions.
     pub batches: Option<Arc<BlockBatches>>,
+    pub solution_batches: Option<Arc<BlockBatches>>,
     /// Conditions of the state, whose operands are the event indicators.
     pub switching: Vec<ConditionId>,
     /// Computes these operands.
@@ -276,13 +279,17 @@ impl Mode {
         let sparsity = sparsity_of(&program);
         let read: Vec<BlockId> = rates.solves.iter().map(|solve| solve.block).collect();
         let motion = Motion::of(&program, &layout, &read);
+        let solutions = solutions_of(&program, &layout, &rates);
+        let batches = |routine: &Routine| BlockBatches::of(&program, &layout, routine).map(Arc::new);
         Mode {
             preamble: layout.preamble(&program),
             assumed: layout.routine(&program, &assumed),
             jacobian: entries.map(|entries| JacobianCode::new(&program, &layout, &sparsity, &entries)),
             sparsity,
-            batches: BlockBatches::of(&program, &layout, &rates).map(Arc::new),
+            batches: batches(&rates),
+            solution_batches: solutions.as_ref().and_then(batches),
             rates,
+            solutions,
             switching: of_state().map(|(id, _)| id).collect(),
             indicators: layout.routine(&program, &operands),
             clock: Clock::new(&program, &layout),
@@ -312,10 +319,17 @@ impl Mode {
             .chain(self.impulses.as_ref().map(ImpulseBalance::routine))
             .chain(self.positions.as_ref().map(PositionConstraints::routine))
             .chain(self.motion.as_ref().map(|motion| &motion.rates))
+            .chain(&self.solutions)
             .chain(self.exchanges.iter().flat_map(Ratios::routines))
             .chain(self.bounds.iter().flat_map(Bounds::routines));
         [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
     }
+}
+
+/// What computes the unknowns of the Newton blocks of a routine, if it has any.
+fn solutions_of(program: &Program, layout: &Layout, rates: &Routine) -> Option<Routine> {
+    let newton: Vec<BlockId> = rates.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block).collect();
+    (!newton.is_empty()).then(|| layout.routine(program, &program.unknowns_of(&newton)))
 }
 
 fn sparsity_of(program: &Program) -> Sparsity {

@@ -21,13 +21,14 @@ const MOST_NAMES: usize = 3;
 impl Model {
     /// Goes on with the Newton solutions at `(t, x)`: those that rates need, and those that only recorded values need.
     pub(super) fn follow_solutions(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        if self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty()) {
+        if let Some(solutions) = self.code.clone().solutions.as_ref() {
             let states = &self.frame.r[self.code.layout.states as usize..][..x.len()];
             if self.rated != Some(t) || states != x {
-                self.rates_at(t, x)?;
+                self.solve_at(t, x)?;
             }
             self.rated = None;
-            let blocks = self.code.rates.solves.iter().map(|solve| solve.block);
+            let newton = solutions.solves.iter().filter(|solve| !solve.guess.is_empty());
+            let blocks = newton.map(|solve| solve.block);
             blocks.for_each(|block| self.frame.solvers[block.0 as usize].newton.accept());
             let code = self.code.clone();
             self.follow_motion(t, x, code.motion.as_ref(), true)?;
@@ -304,7 +305,7 @@ impl Events for Model {
 
     fn try_end(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.code.motion.is_some() {
-            self.rates_at(t, x)?;
+            self.solve_at(t, x)?;
         }
         let recorded = self.recorded.clone();
         let Some(motion) = &recorded.motion else { return Ok(()) };

@@ -47,6 +47,8 @@ pub enum Evaluated {
     Motion,
     /// What is divided by where other variables could be independent, at the end of each step.
     Pivots,
+    /// Solutions of nonlinear laws, at the end of each step.
+    Solutions,
 }
 
 /// How a routine was run, and why.
@@ -92,12 +94,12 @@ struct Tier {
 /// All routines. Copies of a model share what was made before.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tiers {
-    of: [Tier; 7],
+    of: [Tier; 8],
     execution: Execution,
     expected: Option<Expected>,
 }
 
-const ALL: [Evaluated; 7] = [
+const ALL: [Evaluated; 8] = [
     Evaluated::Rates,
     Evaluated::Directions,
     Evaluated::Recorded,
@@ -105,6 +107,7 @@ const ALL: [Evaluated; 7] = [
     Evaluated::Jacobian,
     Evaluated::Motion,
     Evaluated::Pivots,
+    Evaluated::Solutions,
 ];
 
 impl Evaluated {
@@ -118,6 +121,7 @@ impl Evaluated {
             Evaluated::Jacobian => "jacobian",
             Evaluated::Motion => "rates of positions",
             Evaluated::Pivots => "pivots",
+            Evaluated::Solutions => "solutions",
         }
     }
 
@@ -131,6 +135,7 @@ impl Evaluated {
             (What::Jacobian, false) => Some(Evaluated::Jacobian),
             (What::Motion, false) => Some(Evaluated::Motion),
             (What::Pivots, false) => Some(Evaluated::Pivots),
+            (What::Solutions, false) => Some(Evaluated::Solutions),
             (_, true) => None,
         }
     }
@@ -143,6 +148,7 @@ impl Evaluated {
             Evaluated::Jacobian => mode.jacobian.as_ref().map(|jacobian| &jacobian.routine),
             Evaluated::Motion => mode.motion.as_ref().map(|motion| &motion.rates),
             Evaluated::Pivots => mode.exchanges.as_ref().map(|ratios| &ratios.pivots),
+            Evaluated::Solutions => mode.solutions.as_ref(),
         }
     }
 }

@@ -107,7 +107,8 @@ impl Model {
     pub(super) fn reserve_recorded(&mut self) {
         self.frame.reserve(&self.recorded.routine);
         self.recorded.motion.iter().for_each(|motion| self.frame.reserve(&motion.rates));
-        for batches in [&self.code.batches, &self.recorded.batches].into_iter().flatten() {
+        let Mode { batches, solution_batches, .. } = &*self.code;
+        for batches in [batches, solution_batches, &self.recorded.batches].into_iter().flatten() {
             self.frame.reserve_batches(batches);
         }
     }

@@ -11,6 +11,8 @@ const BESIDE: f64 = 1e-8;
 #[derive(Debug, Clone, Copy)]
 pub(super) enum What {
     Rates,
+    /// The solutions of the Newton blocks that rates read, if there are any.
+    Solutions,
     Recorded,
     Indicators,
     /// The Jacobian of the rates, if the model has its code.
@@ -26,6 +28,7 @@ impl Model {
         self.before_evaluation(what, along);
         let routine = match what {
             What::Rates => &self.code.rates,
+            What::Solutions => self.code.solutions.as_ref().expect("asked for only where they are"),
             What::Recorded => &self.recorded.routine,
             What::Indicators => &self.code.indicators,
             What::Jacobian => &self.code.jacobian.as_ref().expect("asked for only where they are").routine,
@@ -34,6 +37,7 @@ impl Model {
         };
         self.frame.begin(match what {
             What::Rates => self.code.batches.as_ref(),
+            What::Solutions => self.code.solution_batches.as_ref(),
             What::Recorded => self.recorded.batches.as_ref(),
             What::Indicators | What::Jacobian | What::Motion | What::Pivots => None,
         });
@@ -73,6 +77,17 @@ impl Model {
         let result = self.rates(t, x, &mut dx);
         self.dx = dx;
         result
+    }
+
+    /// Finds the solutions of the Newton blocks that rates read at `(t, x)`, if there are any.
+    pub(super) fn solve_at(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
+        if self.code.solutions.is_none() {
+            return Ok(());
+        }
+        self.place(t, x);
+        self.evaluate(What::Solutions, false, t)?;
+        self.rated = Some(t);
+        Ok(())
     }
 
     /// Sets the direction of derivatives to that of time: inputs and held signals move, states do not.
@@ -142,7 +157,7 @@ impl Model {
 
     /// Whether there are laws solved by Newton, whose last solution decides which one comes next.
     pub(super) fn follows_solutions_at_all(&self) -> bool {
-        !self.recorded.blocks.is_empty() || self.code.rates.solves.iter().any(|solve| !solve.guess.is_empty())
+        !self.recorded.blocks.is_empty() || self.code.solutions.is_some()
     }
 }
 

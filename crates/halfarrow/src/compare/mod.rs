@@ -1,5 +1,6 @@
 //! All forms of a model beside each other: size, cost of an evaluation, time at equal error, agreement.
 
+mod forms;
 mod ladder;
 mod picture;
 mod reference;
@@ -9,7 +10,7 @@ use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
 use halfarrow_compiler::bond_graph::ParameterKind;
-use halfarrow_compiler::equations::{EquationStep, Form, NewtonBlock, ObservedKind};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, NewtonBlock, ObservedKind};
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
@@ -19,11 +20,13 @@ use crate::equations::by_name;
 use crate::error::{Error, Problem};
 use crate::input::Input;
 use crate::model::Model;
-use crate::run::{Run, Start};
+use crate::run::Run;
 use crate::verdict::Verdict;
+use forms::LEFT_OUT;
+pub use forms::{ComparedForms, SolvedBlocks};
 use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
 use reference::{Apart, POINTS, Reference};
-use subject::{Settings, Subject, Variable, is_over};
+use subject::{Common, Settings, Subject, Variable, is_over};
 
 /// Tolerance of the runs whose agreement is told.
 const TIGHT: f64 = 1e-11;
@@ -31,8 +34,6 @@ const TIGHT: f64 = 1e-11;
 const STIFFNESSES: std::ops::RangeInclusive<i32> = 2..=12;
 /// Why a form has no times.
 const STOPS: &str = "its runs stop before their end";
-/// Why a form was not measured.
-const LEFT_OUT: &str = "left out: the time for comparing was over";
 /// Parts of a budget at whose end the reference, all ladders and all times have to be there.
 const REFERENCE: f64 = 0.4;
 const LADDERS: f64 = 0.75;
@@ -73,8 +74,8 @@ pub struct CompareReport {
     pub to: f64,
     /// Error at which times are compared.
     pub error: f64,
-    /// What errors are measured against.
-    pub reference: ReferenceReport,
+    /// What errors are measured against; `None` if the time did not suffice for it: then no form has times.
+    pub reference: Option<ReferenceReport>,
     /// One for each form, those that do not apply with the reason.
     pub rows: Vec<Row>,
     /// What is to be known.
@@ -96,6 +97,8 @@ pub struct Row {
     /// The form, by its name on the command line.
     #[serde(serialize_with = "by_name")]
     pub form: Form,
+    /// What it is.
+    pub meaning: &'static str,
     /// Why it does not apply, or did not come to the end.
     pub reason: Option<String>,
     /// Number of differential equations; integrated signals are not counted.
@@ -108,6 +111,10 @@ pub struct Row {
     pub flops: Option<usize>,
     /// The same by kind.
     pub operations: Option<OperationsReport>,
+    /// Blocks of equations that an evaluation solves.
+    pub loops: Option<SolvedBlocks>,
+    /// Processor time from the bond graph to what runs, in s.
+    pub seconds_to_compile: Option<f64>,
     /// The method that serves it best at the error asked for.
     pub solver: Option<&'static str>,
     /// Steps of the run at that error.
@@ -188,7 +195,7 @@ pub struct TimedRun {
 pub type Progress<'p> = &'p mut dyn FnMut(f64, &str) -> bool;
 
 impl Model {
-    /// Puts all forms beside each other.
+    /// Puts all forms beside each other: [`compared_forms`](Model::compared_forms), [`measured`](ComparedForms::measured).
     ///
     /// Errors are those of the *motion*: states, stored quantities; each relative to its greatest magnitude in the run.
     /// Every form runs with the same evaluator and exact Jacobians, by each method that can take it; the one that costs
@@ -197,100 +204,13 @@ impl Model {
     /// # Errors
     /// The model has errors, options make no sense, or the reference run stops.
     pub fn compare(&self, compare: &Compare, progress: Progress) -> Result<CompareReport, Error> {
-        check(compare)?;
-        let budget = Budget::new(compare.budget);
-        let mut run = Run { inputs: compare.inputs.clone(), start: Start::Given, ..Run::default() };
-        let minimal = self.subject(&run)?;
-        let to = compare.to.unwrap_or_else(|| typical_time(&minimal));
-        run.to = to;
-        let made = |form: Form| {
-            progress(0.0, form.name());
-            let over = form != Form::Minimal && is_over(budget.part(REFERENCE));
-            let subject = if over {
-                Err(LEFT_OUT.to_string())
-            } else {
-                self.subject(&Run { form, ..run.clone() }).map_err(|error| short(&error))
-            };
-            (form, subject)
-        };
-        let subjects: Vec<(Form, Result<Subject, String>)> = Form::ALL.into_iter().map(made).collect();
-        progress(0.02, "reference");
-        let motion = motion(&minimal);
-        let confirming = [Form::Lagrange, Form::Break, Form::Inverted, Form::Kane, Form::Relaxed];
-        let usable = |form: &Form| {
-            let found = subjects.iter().find(|s| s.0 == *form)?;
-            Some((*form, found.1.as_ref().ok()?))
-        };
-        let mut others: Vec<(Form, &Subject)> = confirming.iter().filter_map(usable).collect();
-        // What is integrated in another way confirms more.
-        others.sort_by_key(|(_, subject)| subject.is_explicit());
-        let reference =
-            Reference::new(&minimal, &others, &motion, to, budget.part(REFERENCE)).map_err(|stopped| match stopped
-                .failure
-            {
-                Failure::Interrupted { .. } => budget.too_short(),
-                failure => self.stopped(failure),
-            })?;
-        let patience = Duration::from_secs_f64(compare.patience.clamp(1e-3, 1e6));
-        let mut forms: Vec<Measured> = Vec::with_capacity(subjects.len());
-        let count = subjects.len() as f64;
-        for (i, (form, subject)) in subjects.into_iter().enumerate() {
-            let mut go_on = || progress(0.05 + 0.45 * i as f64 / count, form.name());
-            let until = budget.share(LADDERS, Form::ALL.len() - i);
-            let effort = Effort { error: compare.error, patience, until };
-            let mut measured = Measured { row: Row { form, ..Row::default() }, ..Measured::default() };
-            match subject {
-                Err(reason) => measured.row.reason = Some(reason),
-                Ok(_) if form == Form::Stiff && self.has_springs()? => {
-                    self.climb_stiff(&mut measured, &run, &reference, effort, &mut go_on)?;
-                    self.describe(&mut measured.row, form)?;
-                }
-                Ok(subject) => {
-                    for method in subject.methods() {
-                        measured.rungs.extend(
-                            ladder(&subject, &reference, method, effort, &mut go_on).into_iter().map(|r| (r, 0)),
-                        );
-                    }
-                    measured.subjects.push(subject);
-                    self.describe(&mut measured.row, form)?;
-                }
-            }
-            measured.cut = is_over(until);
-            forms.push(measured);
-        }
-        let until = budget.part(TIMES);
-        measure(&mut forms, to, compare.repeats.max(1), until, &mut |part| progress(0.5 + 0.45 * part, "times"));
-        progress(0.95, "agreement");
-        let cut = forms.iter().any(|form| form.cut) || is_over(until);
-        let count = forms.len();
-        let finished = |(i, form): (usize, Measured)| {
-            form.finish(&reference, Effort { error: compare.error, patience, until: budget.share(1.0, count - i) })
-        };
-        let mut rows: Vec<Row> = forms.into_iter().enumerate().map(finished).collect();
-        relate(&mut rows);
-        let mut report = CompareReport {
-            model: self.name().to_string(),
-            to,
-            error: compare.error,
-            reference: ReferenceReport { confirmed_by: reference.by.0.name(), confirmed_to: reference.confirmed },
-            rows,
-            notes: Vec::new(),
-        };
-        report.notes = notes(&report);
-        if !self.graph.set_valued.is_empty() {
-            let mode = self.graph.mode_name();
-            report
-                .notes
-                .push(format!("unknowns, index and operations are those of one mode of set-valued laws: {mode}"));
-        }
-        report.notes.extend(budget.note(cut));
-        Ok(report)
+        self.compared_forms(compare, progress)?.measured(progress)
     }
 
     /// Whether the form `stiff` has springs: without constraints there are none. Where there are set-valued laws, in the mode
     /// of the graph or with one of them on another branch.
-    fn has_springs(&self) -> Result<bool, Error> {
-        if self.springs_in_mode()? {
+    fn has_springs(&self, equations: &Equations) -> Result<bool, Error> {
+        if has_springs(equations) {
             return Ok(true);
         }
         let mode = self.graph.mode();
@@ -298,7 +218,8 @@ impl Model {
             for branch in (0..self.graph.set_valued[law].branches.len()).filter(|branch| branch != present) {
                 let mut other = mode.clone();
                 other[law] = branch;
-                if self.with_graph(self.graph.in_mode(&other)).springs_in_mode().unwrap_or(false) {
+                let other = self.with_graph(self.graph.in_mode(&other));
+                if other.equations_in(Form::Stiff).is_ok_and(|equations| has_springs(&equations)) {
                     return Ok(true);
                 }
             }
@@ -306,45 +227,119 @@ impl Model {
         Ok(false)
     }
 
-    fn springs_in_mode(&self) -> Result<bool, Error> {
-        let equations = self.equations_in(Form::Stiff)?;
-        let x = &equations.graph.exprs;
-        let mut parameters = equations.graph.parameters.values();
-        let Some(spring) = parameters.find(|p| p.kind == ParameterKind::SpringStiffness) else { return Ok(false) };
-        let reads = |e: Expr| x.symbols_of(e).contains(&spring.symbol);
-        Ok(equations.steps.iter().any(|step| match step {
-            EquationStep::Assign { value, .. } => reads(*value),
-            EquationStep::Linear(block) => block.matrix.entries().iter().chain(&block.right).any(|&e| reads(e)),
-            EquationStep::Newton(block) => {
-                let NewtonBlock { body, residuals, .. } = &**block;
-                body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
-            }
-            EquationStep::Guard { .. } => false,
-        }))
-    }
-
     /// Ten times the slowest time of the motion near the start, in s, within bounds.
     ///
     /// # Errors
     /// The model has no start.
     pub(crate) fn typical_time(&self) -> Result<f64, Error> {
-        Ok(typical_time(&self.subject(&Run::default())?))
+        let (common, equations) = Common::of(self)?;
+        Ok(typical_time(&common.subject(&equations, &Run::default())?))
+    }
+}
+
+impl<'m> ComparedForms<'m> {
+    /// Runs the forms: times at equal error, agreement.
+    ///
+    /// # Errors
+    /// The reference run stops.
+    pub fn measured(mut self, progress: Progress) -> Result<CompareReport, Error> {
+        progress(0.02, "reference");
+        let minimal = self.subjects[0].as_ref().expect("without it there are no forms");
+        let to = self.compare.to.unwrap_or_else(|| typical_time(minimal));
+        self.run.to = to;
+        let mut report = CompareReport {
+            model: self.common.model.name().to_string(),
+            to,
+            error: self.compare.error,
+            reference: None,
+            rows: Vec::new(),
+            notes: Vec::new(),
+        };
+        let cut = match self.reference(to)? {
+            None => {
+                report.rows = std::mem::take(&mut self.rows);
+                report.notes.extend(self.budget.too_short());
+                true
+            }
+            Some(reference) => {
+                let (rows, cut) = self.rows_with_times(&reference, progress)?;
+                let (confirmed_by, confirmed_to) = (reference.by.0.name(), reference.confirmed);
+                (report.rows, report.reference) = (rows, Some(ReferenceReport { confirmed_by, confirmed_to }));
+                report.notes = notes(&report);
+                cut
+            }
+        };
+        let graph = &self.common.model.graph;
+        if !graph.set_valued.is_empty() {
+            let mode = graph.mode_name();
+            report
+                .notes
+                .push(format!("unknowns, index and operations are those of one mode of set-valued laws: {mode}"));
+        }
+        report.notes.extend(self.budget.note(cut));
+        Ok(report)
     }
 
-    /// Counts and index.
-    fn describe(&self, row: &mut Row, form: Form) -> Result<(), Error> {
-        let equations = self.equations_in(form)?;
-        row.differential = Some(equations.counts.differential);
-        row.algebraic = Some(equations.counts.algebraic + equations.implicit.len());
-        row.index = Some(equations.index);
-        Ok(())
+    /// What errors are measured against; `None` if the time does not suffice.
+    fn reference(&self, to: f64) -> Result<Option<Reference>, Error> {
+        let of = |form: &Form| {
+            let found = self.rows.iter().position(|row| row.form == *form)?;
+            Some((*form, self.subjects[found].as_ref()?))
+        };
+        let confirming = [Form::Lagrange, Form::Break, Form::Inverted, Form::Kane, Form::Relaxed];
+        let mut others: Vec<(Form, &Subject)> = confirming.iter().filter_map(of).collect();
+        // What is integrated in another way confirms more.
+        others.sort_by_key(|(_, subject)| subject.is_explicit());
+        let minimal = self.subjects[0].as_ref().expect("without it there are no forms");
+        match Reference::new(minimal, &others, &motion(minimal), to, self.budget.part(REFERENCE)) {
+            Ok(reference) => Ok(Some(reference)),
+            Err(stopped) => match stopped.failure {
+                Failure::Interrupted { .. } => Ok(None),
+                failure => Err(self.common.model.stopped(failure)),
+            },
+        }
+    }
+
+    /// Rows with times, and whether something was cut short.
+    fn rows_with_times(&mut self, reference: &Reference, progress: Progress) -> Result<(Vec<Row>, bool), Error> {
+        let patience = Duration::from_secs_f64(self.compare.patience.clamp(1e-3, 1e6));
+        let (error, count) = (self.compare.error, self.rows.len());
+        let mut forms: Vec<Measured> = Vec::with_capacity(count);
+        let all = std::mem::take(&mut self.subjects).into_iter().zip(std::mem::take(&mut self.rows));
+        for (i, (subject, row)) in all.enumerate() {
+            let mut go_on = || progress(0.05 + 0.45 * i as f64 / count as f64, row.form.name());
+            let until = self.budget.share(LADDERS, count - i);
+            let effort = Effort { error, patience, until };
+            let mut measured = Measured { row: row.clone(), ..Measured::default() };
+            if let Some(subject) = subject {
+                match self.stiff.as_ref().filter(|_| row.form == Form::Stiff) {
+                    Some(equations) if self.common.model.has_springs(equations)? => {
+                        self.climb_stiff(&mut measured, equations, reference, effort, &mut go_on)?;
+                    }
+                    _ => climb(&mut measured, subject, reference, effort, &mut go_on),
+                }
+            }
+            measured.cut = is_over(until);
+            forms.push(measured);
+        }
+        let until = self.budget.part(TIMES);
+        let (to, repeats) = (reference.to, self.compare.repeats.max(1));
+        measure(&mut forms, to, repeats, until, &mut |part| progress(0.5 + 0.45 * part, "times"));
+        progress(0.95, "agreement");
+        let cut = forms.iter().any(|form| form.cut) || is_over(until);
+        let finished = |(i, form): (usize, Measured)| {
+            form.finish(reference, Effort { error, patience, until: self.budget.share(1.0, count - i) })
+        };
+        let mut rows: Vec<Row> = forms.into_iter().enumerate().map(finished).collect();
+        relate(&mut rows);
+        Ok((rows, cut))
     }
 
     /// The form `stiff`: its springs get stiffer as the error gets less.
-    fn climb_stiff<'m>(
-        &'m self,
+    fn climb_stiff(
+        &self,
         measured: &mut Measured<'m>,
-        run: &Run,
+        equations: &Equations,
         reference: &Reference,
         effort: Effort,
         go_on: &mut dyn FnMut() -> bool,
@@ -355,7 +350,8 @@ impl Model {
                 break;
             }
             let stiffness = ten_to(power);
-            let subject = self.subject(&Run { form: Form::Stiff, stiffness: Some(stiffness), ..run.clone() })?;
+            let run = Run { form: Form::Stiff, stiffness: Some(stiffness), ..self.run.clone() };
+            let subject = self.common.subject(equations, &run)?;
             let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to, until: effort.until };
             let Some(error) = error_of(&subject, reference, exact) else { continue };
             let mut rungs: Vec<Rung> = Vec::new();
@@ -390,6 +386,37 @@ impl Model {
     }
 }
 
+/// A form by each method that can take it, at tighter and tighter tolerances.
+fn climb<'m>(
+    measured: &mut Measured<'m>,
+    subject: Subject<'m>,
+    reference: &Reference,
+    effort: Effort,
+    go_on: &mut dyn FnMut() -> bool,
+) {
+    for method in subject.methods() {
+        measured.rungs.extend(ladder(&subject, reference, method, effort, go_on).into_iter().map(|r| (r, 0)));
+    }
+    measured.subjects.push(subject);
+}
+
+/// Whether equations of the form `stiff` read the stiffness of springs.
+fn has_springs(equations: &Equations) -> bool {
+    let x = &equations.graph.exprs;
+    let mut parameters = equations.graph.parameters.values();
+    let Some(spring) = parameters.find(|p| p.kind == ParameterKind::SpringStiffness) else { return false };
+    let reads = |e: Expr| x.symbols_of(e).contains(&spring.symbol);
+    equations.steps.iter().any(|step| match step {
+        EquationStep::Assign { value, .. } => reads(*value),
+        EquationStep::Linear(block) => block.matrix.entries().iter().chain(&block.right).any(|&e| reads(e)),
+        EquationStep::Newton(block) => {
+            let NewtonBlock { body, residuals, .. } = &**block;
+            body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
+        }
+        EquationStep::Guard { .. } => false,
+    })
+}
+
 /// A form with its runs; `stiff` has a subject for each stiffness.
 #[derive(Default)]
 struct Measured<'m> {
@@ -422,13 +449,12 @@ impl Budget {
         self.part(part).map(|end| now + end.since(now) / among.max(1) as u32)
     }
     /// That it does not even suffice for the reference.
-    fn too_short(&self) -> Error {
-        let seconds = self.whole.unwrap_or_default().as_secs_f64();
-        let reason = format!(
-            "the {seconds} s for comparing do not suffice for the run that all others are measured against: give more time, \
-             or a shorter run"
-        );
-        Problem::BadOption { reason }.into()
+    fn too_short(&self) -> Option<String> {
+        let seconds = self.whole?.as_secs_f64();
+        Some(format!(
+            "the {seconds} s for comparing do not suffice for the run that all others are measured against, so that there are \
+             sizes and no times: give more time, or a shorter run"
+        ))
     }
     /// What is to be said if it was spent before everything was measured.
     fn note(&self, cut: bool) -> Option<String> {
@@ -537,9 +563,9 @@ fn relate(rows: &mut [Row]) {
 
 fn notes(report: &CompareReport) -> Vec<String> {
     let mut notes = Vec::new();
-    let confirmed = report.reference.confirmed_to;
-    if confirmed > 0.1 * report.error || confirmed.is_nan() {
-        let by = report.reference.confirmed_by;
+    let reference = report.reference.as_ref();
+    let doubted = |r: &&ReferenceReport| r.confirmed_to > 0.1 * report.error || r.confirmed_to.is_nan();
+    if let Some(ReferenceReport { confirmed_by: by, confirmed_to: confirmed }) = reference.filter(doubted) {
         notes.push(format!(
             "the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little"
         ));

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use halfarrow_compiler::bond_graph::BondGraph;
-use halfarrow_compiler::equations::{Form, ObservedKind};
+use halfarrow_compiler::causal_graph::CausalGraph;
+use halfarrow_compiler::equations::{Equations, Form, ObservedKind};
 use halfarrow_compiler::program::Observed;
 use halfarrow_exec::{self as exec, Operations};
 use halfarrow_sim::{
@@ -19,7 +20,7 @@ use crate::clock::{Moment, ProcessorTime};
 use crate::error::Error;
 use crate::input::connect;
 use crate::model::Model;
-use crate::run::{Run, Start, set_spring_rate};
+use crate::run::{Run, Start, set_spring_rate, set_up};
 use crate::verdict::Made;
 
 /// A form at its start.
@@ -110,27 +111,49 @@ fn given(ended: Result<Summary, Stopped>, audit: AuditReport) -> Option<AuditRep
     (!given_up).then_some(audit)
 }
 
-impl Model {
+/// What all forms of a model have in common, made once.
+pub(super) struct Common<'m> {
+    pub model: &'m Model,
+    causal: CausalGraph,
+    /// The minimal form, ready to run: it starts the others.
+    minimal: exec::Model,
+}
+
+impl<'m> Common<'m> {
+    /// That of a model, and its minimal equations.
+    pub fn of(model: &'m Model) -> Result<(Common<'m>, Equations), Error> {
+        let causal = model.causal_graph()?;
+        let equations = model.equations_of(&causal, Form::Minimal)?;
+        let minimal = model.system(&equations)?;
+        Ok((Common { model, causal, minimal }, equations))
+    }
+
+    /// The equations of a form.
+    pub fn equations(&self, form: Form) -> Result<Equations, Error> {
+        self.model.equations_of(&self.causal, form)
+    }
+
     /// A form at the start of a run.
-    pub(super) fn subject(&self, run: &Run) -> Result<Subject<'_>, Error> {
-        let equations = self.equations_in(run.form)?;
-        let graph = &self.graph;
-        if self.runs_alone(run.form) {
-            let mut system = self.system(&equations)?;
+    pub fn subject(&self, equations: &Equations, run: &Run) -> Result<Subject<'m>, Error> {
+        let (model, form) = (self.model, equations.form);
+        let graph = &model.graph;
+        if model.runs_alone(form) {
+            let mut system = if form == Form::Minimal { self.minimal.clone() } else { model.system(equations)? };
             connect(&system.program().inputs.clone(), &run.inputs, |name, t, v| system.connect(name, t, v))?;
-            let x = self.start(&mut system, run.start)?;
-            return Ok(Subject { graph, form: run.form, system: Ready::Explicit(system, x) });
+            let x = model.start(&mut system, run.start)?;
+            return Ok(Subject { graph, form, system: Ready::Explicit(system, x) });
         }
-        let explicit = equations.residuals.is_empty() && self.graph.set_valued.is_empty();
-        let mut system = self.implicit_system(&equations, run)?;
-        let x = self.start(system.reference_mut(), Start::Given)?;
+        let explicit = equations.residuals.is_empty() && graph.set_valued.is_empty();
+        let mut system = model.form_beside(equations, self.minimal.clone())?;
+        set_up(&mut system, run)?;
+        let x = model.start(system.reference_mut(), Start::Given)?;
         set_spring_rate(&mut system, &x)?;
-        let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
+        let (y, yp) = system.start_at(0.0, &x).map_err(|failure| model.stopped(failure))?;
         let system = match explicit {
             true => Ready::Explicit(system.into_form(), y),
             false => Ready::Implicit(system, y, yp),
         };
-        Ok(Subject { graph, form: run.form, system })
+        Ok(Subject { graph, form, system })
     }
 }
 

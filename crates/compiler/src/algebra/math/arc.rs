@@ -1,13 +1,16 @@
 //! Inverse trigonometric functions: all are the angle of a vector.
 //!
-//! `atan(n/d) = atan(j/8) + atan(t)`, `t = (n - d j/8)/(d + n j/8)`, with `j` the integer nearest to `8 n/d`.
+//! `atan(n/d) = atan(j/8) + atan(t)`, `t = (n - d j/8)/(d + n j/8)`, with `j` the integer nearest to `8 n/d`. For one number
+//! `x`: `atan(x) = atan(c) + atan(t)`, `t = (x - c)/(1 + x c)`, with `c` the middle of the quarter of its octave.
 
 use super::constants::*;
-use super::double::{Double, fast_two_sum, product, quotient, sum, two_product, two_sum};
+use super::double::{Double, fast_two_sum, leading, product, quotient, sum, two_product, two_sum};
 use super::trigonometric::ROUNDER;
 
 /// Below this the arc is its sine: 2^-27.
 const TINY: f64 = 1.0 / 134217728.0;
+/// Below this the arc needs no other arc beside it.
+const SMALL: f64 = 1.0 / 16.0;
 const QUARTER: Double = (PIO2_HI, PIO2_LO);
 const HALF: Double = (PI_HI, PI_LO);
 
@@ -27,8 +30,7 @@ fn below_diagonal(n: Double, d: Double) -> Double {
     let (down, across) = (product(d, c), product(n, c));
     let t = quotient(sum(n, (-down.0, -down.1)), sum(d, across));
     let z = t.0 * t.0;
-    let zz = z * z;
-    let p = (ARC[0] + ARC[1] * z) + zz * ((ARC[2] + ARC[3] * z) + zz * ARC[4]);
+    let p = short_arc(z);
     let [arc, arc_rest] = ARCS[(rounded.to_bits() & 15) as usize];
     let (hi, lo) = two_sum(arc, t.0);
     fast_two_sum(hi, lo + (arc_rest + (t.1 - (t.0 * z) * p)))
@@ -81,8 +83,38 @@ pub fn atan(x: f64) -> f64 {
     if size < TINY || x.is_nan() {
         return x;
     }
-    let value = if size > 1e18 { PIO2_HI } else { angle((size, 0.0), (1.0, 0.0)).0 };
+    let value = match () {
+        () if size < SMALL => size - size * (size * size) * short_arc(size * size),
+        () if size > 1e18 => PIO2_HI,
+        () if size >= 16.0 => arc_beyond([PIO2_HI, PIO2_LO], -1.0, (size, 0.0)),
+        () => {
+            let quarter = size.to_bits() >> 50;
+            let c = f64::from_bits(quarter << 50 | 1 << 49);
+            let across = two_product(size, c);
+            let (d, rest) = two_sum(1.0, across.0);
+            arc_beyond(ARCS_OF_QUARTERS[(quarter - (SMALL.to_bits() >> 50)) as usize], size - c, (d, rest + across.1))
+        }
+    };
     if x < 0.0 { -value } else { value }
+}
+
+/// `(t - atan t)/t^3` by `t^2`.
+#[inline(always)]
+fn short_arc(z: f64) -> f64 {
+    let zz = z * z;
+    (ARC[0] + ARC[1] * z) + zz * ((ARC[2] + ARC[3] * z) + zz * ARC[4])
+}
+
+/// An arc that is known, and `atan(n/d)` for a small `n/d`.
+#[inline(always)]
+fn arc_beyond([arc, arc_rest]: [f64; 2], n: f64, (d, d_rest): Double) -> f64 {
+    let inverse = 1.0 / d;
+    let (hi, front) = (leading(n * inverse), leading(d));
+    let lo = ((n - hi * front) - hi * ((d - front) + d_rest)) * inverse;
+    let t = hi + lo;
+    let z = t * t;
+    let (sum, rest) = fast_two_sum(arc, hi);
+    sum + (rest + (arc_rest + (lo - (t * z) * short_arc(z))))
 }
 
 /// The angle of the vector `(x, y)`, above `-pi` and up to `pi`.

@@ -173,6 +173,9 @@ def logarithm(out):
 def arcs(out):
     values = [atan(mpf(j) / 8) for j in range(9)]
     out.table("ARCS", [(nearest(v), nearest(v - mpf(nearest(v)))) for v in values], "atan(j/8), and what is left of it.")
+    middles = [mpf(2) ** octave * (1 + mpf(2 * quarter + 1) / 8) for octave in range(-4, 4) for quarter in range(4)]
+    out.table("ARCS_OF_QUARTERS", [(nearest(atan(c)), nearest(atan(c) - mpf(nearest(atan(c))))) for c in middles],
+              "atan c at the middles c of quarters of octaves from 1/16 to 16, and what is left of it.")
     most = mpf("0.0631") ** 2
     out.polynomial("ARC", "(t - atan t)/t^3 by z = t^2", lambda z: (sqrt(z) - atan(sqrt(z))) / (z * sqrt(z)),
                    lambda z: z, 0, most, 5)

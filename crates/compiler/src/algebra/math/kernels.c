@@ -592,7 +592,14 @@ HA_FUNCTION double ha_pow(double x, double y)
 //always
 /* Inverse trigonometric functions. */
 
-//item ha_below_diagonal: HA_ARC HA_ARCS HA_FUNCTION HA_ROUNDER ha_bits ha_fast_two_sum ha_minus ha_pair ha_product ha_quotient ha_sum ha_two_sum
+//item ha_short_arc: HA_ARC HA_INLINE
+HA_INLINE double ha_short_arc(double z)
+{
+    const double zz = z * z;
+    return (HA_ARC[0] + HA_ARC[1] * z) + zz * ((HA_ARC[2] + HA_ARC[3] * z) + zz * HA_ARC[4]);
+}
+
+//item ha_below_diagonal: HA_ARCS HA_FUNCTION HA_ROUNDER ha_bits ha_fast_two_sum ha_minus ha_pair ha_product ha_quotient ha_short_arc ha_sum ha_two_sum
 HA_FUNCTION ha_double ha_below_diagonal(ha_double n, ha_double d)
 {
     const double rounded = 8.0 * (n.hi / d.hi) + HA_ROUNDER;
@@ -602,8 +609,7 @@ HA_FUNCTION ha_double ha_below_diagonal(ha_double n, ha_double d)
     const ha_double across = ha_product(n, c);
     const ha_double t = ha_quotient(ha_sum(n, ha_minus(down)), ha_sum(d, across));
     const double z = t.hi * t.hi;
-    const double zz = z * z;
-    const double p = (HA_ARC[0] + HA_ARC[1] * z) + zz * ((HA_ARC[2] + HA_ARC[3] * z) + zz * HA_ARC[4]);
+    const double p = ha_short_arc(z);
     const double *arc = HA_ARCS[ha_bits(rounded) & 15];
     const ha_double s = ha_two_sum(arc[0], t.hi);
     return ha_fast_two_sum(s.hi, s.lo + (arc[1] + (t.lo - (t.hi * z) * p)));
@@ -664,7 +670,20 @@ HA_FUNCTION double ha_acos(double x)
     return x < 0.0 ? ha_sum(ha_pair(HA_PI_HI, HA_PI_LO), ha_minus(value)).hi : value.hi;
 }
 
-//item ha_atan: HA_FUNCTION HA_PIO2_HI HA_TINY ha_angle ha_pair
+//item ha_arc_beyond: HA_INLINE ha_fast_two_sum ha_leading ha_short_arc
+HA_INLINE double ha_arc_beyond(double arc, double arc_rest, double n, ha_double d)
+{
+    const double inverse = 1.0 / d.hi;
+    const double hi = ha_leading(n * inverse);
+    const double front = ha_leading(d.hi);
+    const double lo = ((n - hi * front) - hi * ((d.hi - front) + d.lo)) * inverse;
+    const double t = hi + lo;
+    const double z = t * t;
+    const ha_double sum = ha_fast_two_sum(arc, hi);
+    return sum.hi + (sum.lo + (arc_rest + (lo - (t * z) * ha_short_arc(z))));
+}
+
+//item ha_atan: HA_ARCS_OF_QUARTERS HA_FUNCTION HA_PIO2_HI HA_PIO2_LO HA_TINY ha_arc_beyond ha_bits ha_number ha_pair ha_short_arc ha_two_product ha_two_sum
 HA_FUNCTION double ha_atan(double x)
 {
     const double size = fabs(x);
@@ -672,7 +691,20 @@ HA_FUNCTION double ha_atan(double x)
     if (size < HA_TINY || x != x) {
         return x;
     }
-    value = size > 1e18 ? HA_PIO2_HI : ha_angle(ha_pair(size, 0.0), ha_pair(1.0, 0.0)).hi;
+    if (size < 0.0625) {
+        value = size - size * (size * size) * ha_short_arc(size * size);
+    } else if (size > 1e18) {
+        value = HA_PIO2_HI;
+    } else if (size >= 16.0) {
+        value = ha_arc_beyond(HA_PIO2_HI, HA_PIO2_LO, -1.0, ha_pair(size, 0.0));
+    } else {
+        const uint64_t quarter = ha_bits(size) >> 50;
+        const double c = ha_number(quarter << 50 | UINT64_C(1) << 49);
+        const double *arc = HA_ARCS_OF_QUARTERS[quarter - UINT64_C(4076)];
+        const ha_double across = ha_two_product(size, c);
+        const ha_double d = ha_two_sum(1.0, across.hi);
+        value = ha_arc_beyond(arc[0], arc[1], size - c, ha_pair(d.hi, d.lo + across.lo));
+    }
     return x < 0.0 ? -value : value;
 }
 

@@ -14,7 +14,7 @@ mod work;
 use std::rc::Rc;
 
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine, Trigger};
+use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine, Step, Trigger};
 
 use super::Export;
 use super::blocks::{elimination_room, full_room};
@@ -61,6 +61,10 @@ pub(super) struct Plan<'a> {
     /// Where the matrices of solve blocks have entries.
     pub patterns: Rc<Patterns>,
     reads: Vec<usize>,
+    /// Whether the code of each reads conditions.
+    conditional: Vec<bool>,
+    /// Unknowns of those that rates read.
+    pub(super) solutions: usize,
     rates_blocks: Vec<BlockId>,
     shown_blocks: Vec<BlockId>,
     /// Newton blocks of positions whose motion is followed.
@@ -100,6 +104,7 @@ pub(super) struct Sizes {
 #[derive(Debug, Clone, Default)]
 struct Works {
     rates: OperationCount,
+    solutions: OperationCount,
     observe: OperationCount,
     switching: OperationCount,
     sources: OperationCount,
@@ -142,6 +147,8 @@ impl<'a> Plan<'a> {
             newton: Vec::new(),
             patterns: Rc::new(Patterns::of(program)),
             reads: Vec::new(),
+            conditional: Vec::new(),
+            solutions: 0,
             rates_blocks: Vec::new(),
             shown_blocks: Vec::new(),
             motion_blocks: Vec::new(),
@@ -191,6 +198,7 @@ impl<'a> Plan<'a> {
         };
         functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
+        functions.extend(plain(&mut writer, "ha_solutions_code", &routines.solutions));
         functions.extend(plain(&mut writer, "ha_motion_code", &routines.motion));
         functions.extend(plain(&mut writer, "ha_shown_motion_code", &routines.shown_motion));
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
@@ -249,6 +257,10 @@ impl<'a> Plan<'a> {
         functions.extend(along(&mut writer, "ha_positions_along", ALONG, &routines.positions, begin));
 
         self.reads = blocks.values().map(|(outer, _)| outer.len()).collect();
+        let reads_conditions =
+            |code: &Code| code.steps.iter().any(|s| matches!(s, Step::Op { op, .. } if op.is_held()));
+        self.conditional = blocks.values().map(|(_, code)| reads_conditions(code)).collect();
+        self.solutions = routines.solutions.code.outputs.len();
         for (i, (block, (_, code))) in blocks.iter().enumerate() {
             let pattern = program.blocks[*block].matrix().values.pattern();
             self.functions.extend(block_functions(&mut writer, i, pattern, code));
@@ -261,6 +273,7 @@ impl<'a> Plan<'a> {
         self.works = Works {
             rates: work(&routines.rates),
             observe: work(&routines.observe),
+            solutions: work(&routines.solutions),
             switching: work(&routines.switching),
             sources: work(&routines.sources),
             directional: work(&routines.rates).along(),

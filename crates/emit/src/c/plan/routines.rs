@@ -10,6 +10,8 @@ use super::{ModeTables, Plan};
 pub(super) struct Routines {
     pub preamble: Routine,
     pub rates: Routine,
+    /// The unknowns of the Newton blocks that these read, and no more.
+    pub solutions: Routine,
     /// Of positions that these read, and of those that only outputs do.
     pub motion: Routine,
     pub shown_motion: Routine,
@@ -84,6 +86,7 @@ impl Routines {
             impulses: p.routine(&balanced.collect::<Vec<_>>()),
             positions: p.routine(&events.constraints(p).map(|c| c.residual).collect::<Vec<_>>()),
             preamble: p.preamble(&p.determined(&wanted)),
+            solutions: p.routine(&p.unknowns_of(&read)),
             motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&read))),
             shown_motion: p.routine(&p.rates_of_positions(&p.motion_blocks(&shown_alone))),
             rates: guarded,
@@ -98,12 +101,13 @@ impl Routines {
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {
-        let Routines { preamble, rates, motion, shown_motion, observe, switching, clock, sources, domains, .. } = self;
+        let Routines { preamble, rates, solutions, motion, shown_motion, observe, switching, clock, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, margins, compared, carried, .. } = self;
-        let Routines { open, ratios, pivots, relations, .. } = self;
+        let Routines { open, ratios, pivots, relations, sources, domains, .. } = self;
         let all = [
             preamble,
             rates,
+            solutions,
             motion,
             shown_motion,
             observe,

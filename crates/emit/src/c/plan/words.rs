@@ -75,6 +75,7 @@ impl Plan<'_> {
             ("PATTERNS", self.patterns.tables()),
             ("SPARSE_FULL_AT_MOST", FULL_AT_MOST.to_string()),
             ("RATES_BLOCKS", join(block_numbers(&self.rates_blocks))),
+            ("SOLUTIONS_OF_RATES", self.solutions.to_string()),
             ("RATES_BLOCK_COUNT", self.rates_blocks.len().to_string()),
             ("SHOWN_BLOCKS", join(block_numbers(&self.shown_blocks))),
             ("SHOWN_BLOCK_COUNT", self.shown_blocks.len().to_string()),
@@ -229,9 +230,18 @@ impl Plan<'_> {
                 true => "1, ",
                 false => "0, ",
             };
-            let place = memory[i];
-            let row =
-                written!("    {{{}, {}, {}, {}{}, {}, {}}},\n", pattern, reads, place, position, code, terms, along);
+            let (place, conditions) = (memory[i], usize::from(self.conditional[i]));
+            let row = written!(
+                "    {{{}, {}, {}, {}, {}{}, {}, {}}},\n",
+                pattern,
+                reads,
+                place,
+                conditions,
+                position,
+                code,
+                terms,
+                along
+            );
             row.note(&mut notes);
             list += &row.text;
         }

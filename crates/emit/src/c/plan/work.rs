@@ -69,13 +69,14 @@ impl Plan<'_> {
         let follows = |blocks: &[BlockId], work: &OperationCount| {
             if blocks.is_empty() { OperationCount::default() } else { work.clone() }
         };
-        let followed = follows(&self.rates_blocks, &w.rates) + follows(&self.shown_blocks, &w.observe);
+        let followed = follows(&self.rates_blocks, &w.solutions) + follows(&self.shown_blocks, &w.observe);
         let sources = if self.delays.is_empty() {
             OperationCount::default()
         } else {
             w.rates.clone() + w.sources.clone().along()
         };
-        step = step + followed.clone() + sources.clone() + self.putting_back();
+        let tried = if self.motion_of_rates > 0 { w.solutions.clone() } else { OperationCount::default() };
+        step = step + tried + followed.clone() + sources.clone() + self.putting_back();
         let held = (self.delays.len() + self.samples.len()) as u64;
         let curves =
             self.clocks.iter().filter(|&&c| self.program.conditions[c].trigger == EventTrigger::CurvedTime).count()

@@ -88,6 +88,7 @@ static int ha_carry(ha_model *m, $real *x)
         static const int starts[][2] = {
 $SOLUTION_TABLE
         };
+        $ha_forget_solutions(m);
         $ha_fill(m->memory, $0.0, $MEMORY);
         for (i = 0; i < $SOLUTIONS; ++i) {
             const $real value = m->left_values[starts[i][1]];

@@ -676,16 +676,25 @@ static int ha_lu_is_positive(const ha_lu *l)
 }
 
 //item ha_linear
-/* a x = b with a matrix that varies: the solution in x. 0 if there is none or more than one. */
-static int ha_linear(ha_model *m, const ha_pattern *pattern, const $real *a, const $real *b, $real *x)
+/* a x = b with a matrix that varies: the solution in x, the factors in a place. 0 if there is none or more than one. */
+static int ha_linear($real *place, int *order, const ha_pattern *pattern, const $real *a, const $real *b, $real *x)
 {
-    ha_lu l = $ha_lu_at(m->work, m->order, pattern);
+    ha_lu l = $ha_lu_at(place, order, pattern);
     if (!$ha_lu_factor(&l, a)) {
         return 0;
     }
     $ha_copy(x, b, l.n);
     $ha_lu_solve(&l, x);
     return 1;
+}
+
+//item ha_linear_borrowed
+/* The same with the matrix whose factors stand in a place. */
+static void ha_linear_borrowed($real *place, int *order, const ha_pattern *pattern, const $real *b, $real *x)
+{
+    ha_lu l = $ha_lu_at(place, order, pattern);
+    $ha_copy(x, b, l.n);
+    $ha_lu_solve(&l, x);
 }
 
 //item ha_linear_constant

@@ -25,12 +25,7 @@ static int ha_parameters(ha_model *m)
     }
 //end
 //if newton
-    for (i = 0; i < $BLOCKS; ++i) {
-        m->following[i] = 0;
-//if sought_positions
-        m->motion_known[i] = 0;
-//end
-    }
+    $ha_forget_solutions(m);
     if (!m->begun) {
         $ha_fill(m->memory, $0.0, $MEMORY);
 //if sought_positions

@@ -58,19 +58,11 @@ static void ha_restart(ha_model *m)
     m->state_hold = HA_FOLLOW;
 //end
 //if newton
-    {
-        int i;
-        for (i = 0; i < $BLOCKS; ++i) {
-            m->following[i] = 0;
+    $ha_forget_solutions(m);
+    $ha_fill(m->memory, $0.0, $MEMORY);
 //if sought_positions
-            m->motion_known[i] = 0;
+    $ha_seek_positions(m);
 //end
-        }
-        $ha_fill(m->memory, $0.0, $MEMORY);
-//if sought_positions
-        $ha_seek_positions(m);
-//end
-    }
 //end
 //if switches
     m->signs_taken = (double)NAN;

@@ -42,7 +42,7 @@ static int ha_try(ha_model *m, double t)
     }
 //if rates_motion
     if (status == $MODEL_OK) {
-        status = $model_rates(m, t, m->trial, m->dx);
+        status = $ha_solve(m, t, m->trial);
     }
 //end
 //if shown_motion

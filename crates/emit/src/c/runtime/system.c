@@ -519,10 +519,33 @@ static void ha_leave_solutions(ha_model *m)
     int i;
     for (i = 0; i < $BLOCKS; ++i) {
         m->following[i] = 0;
+        m->fresh[i] = 0;
 //if sought_positions
         m->motion_known[i] = 0;
 //end
     }
+}
+
+//end
+//if newton
+//item ha_forget_solutions
+/* Any solution may come next, and the previous one may be none. */
+static void ha_forget_solutions(ha_model *m)
+{
+    int i;
+    $ha_leave_solutions(m);
+    for (i = 0; i < $BLOCKS; ++i) {
+        m->settled[i] = 0;
+    }
+}
+
+//end
+//if rates_newton
+//item ha_solve
+/* The solutions of the Newton blocks that rates read, at (t, x). */
+static int ha_solve(ha_model *m, double t, const $real *x)
+{
+    return $ha_run(m, $ha_solutions_code, t, x, m->solutions, $SOLUTIONS_OF_RATES);
 }
 
 //end
@@ -536,7 +559,7 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
     {
         static const int blocks[] = {$RATES_BLOCKS};
         int i;
-        status = $model_rates(m, t, x, m->dx);
+        status = $ha_solve(m, t, x);
         if (status != $MODEL_OK) {
             return status;
         }

@@ -34,11 +34,22 @@ impl Frame {
 
     /// Whether the root is known, or has been found in a batch of blocks of the same shape.
     fn has_root(&mut self, solve: &Solve) -> bool {
-        if !self.is_fresh(solve) {
-            self.solve_batch(solve);
-            return self.is_fresh(solve);
+        if self.is_fresh(solve) || self.rests(solve) {
+            return true;
         }
-        true
+        self.solve_batch(solve);
+        self.is_fresh(solve)
+    }
+
+    /// Whether the root is the previous solution, since the block reads what it read there.
+    fn rests(&mut self, solve: &Solve) -> bool {
+        let Frame { r, solvers, .. } = self;
+        let newton = &mut solvers[solve.block.0 as usize].newton;
+        let rests = newton.rests(solve.outer.iter().map(|&register| r[register as usize]));
+        if rests {
+            newton.rest();
+        }
+        rests
     }
 
     /// Puts the unknowns of a Newton block where they belong if its root needs no search of its own; whether it does not.

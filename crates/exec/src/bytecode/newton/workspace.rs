@@ -15,10 +15,13 @@ pub(crate) struct Newton {
     pub previous: Vec<f64>,
     /// Whether it is an accepted solution, which is followed.
     pub following: bool,
+    /// Whether it solves the equations where the block reads what it read there, with the present parameters and whatever
+    /// conditions.
+    settled: bool,
     /// Counts its changes, from 1 on.
     pub(in crate::bytecode) version: u64,
     /// What the block read there, and its Jacobian: part of the model's state too.
-    pub(super) previous_outer: Vec<f64>,
+    pub(in crate::bytecode) previous_outer: Vec<f64>,
     pub(in crate::bytecode) previous_jacobian: Vec<f64>,
     /// The last solution found, what the block read there, and its Jacobian.
     pub x: Vec<f64>,
@@ -82,6 +85,7 @@ pub(crate) struct Followed {
     motion: Motion,
     previous: Vec<f64>,
     following: bool,
+    settled: bool,
     /// What the block read at the accepted solution, and its Jacobian there.
     outer: Vec<f64>,
     jacobian: Vec<f64>,
@@ -99,6 +103,7 @@ impl Newton {
             short: true,
             version: 1,
             following: false,
+            settled: false,
             previous_outer: Vec::new(),
             previous_jacobian: matrix.clone(),
             x: line.clone(),
@@ -142,6 +147,7 @@ impl Newton {
         self.previous.fill(0.0);
         self.version += 1;
         self.floating.ever.fill(false);
+        self.settled = false;
         self.leave();
     }
 
@@ -152,7 +158,7 @@ impl Newton {
 
     /// The next solution starts where unknown `i` has this value.
     pub fn start_at(&mut self, i: usize, value: f64) {
-        (self.previous[i], self.fresh) = (value, false);
+        (self.previous[i], self.fresh, self.settled) = (value, false, false);
         self.version += 1;
     }
 
@@ -176,7 +182,8 @@ impl Newton {
         self.previous.copy_from_slice(&self.x);
         self.previous_outer.copy_from_slice(&self.outer);
         self.previous_jacobian.copy_from_slice(&self.jacobian);
-        (self.following, self.fresh) = (true, false);
+        // Where the block reads the same, it goes on from itself.
+        (self.following, self.settled, self.short) = (true, self.fresh, true);
     }
 
     /// The state, to be restored.
@@ -185,6 +192,7 @@ impl Newton {
             motion: self.motion.clone(),
             previous: self.previous.clone(),
             following: self.following,
+            settled: self.settled,
             outer: self.previous_outer.clone(),
             jacobian: self.previous_jacobian.clone(),
             floated: self.floating.ever.clone(),
@@ -199,7 +207,22 @@ impl Newton {
         self.previous_outer.copy_from_slice(&from.outer);
         self.previous_jacobian.copy_from_slice(&from.jacobian);
         self.floating.ever.copy_from_slice(&from.floated);
-        (self.following, self.fresh) = (from.following, false);
+        (self.following, self.settled, self.fresh) = (from.following, from.settled, false);
+    }
+
+    /// Whether the block, which reads these values, reads what it read at the previous solution, and that is one.
+    #[inline]
+    pub(in crate::bytecode) fn rests(&self, reads: impl Iterator<Item = f64>) -> bool {
+        self.settled && self.previous_outer.iter().zip(reads).all(|(before, now)| before.to_bits() == now.to_bits())
+    }
+
+    /// The previous solution is the one found.
+    pub(super) fn rest(&mut self) {
+        self.x.copy_from_slice(&self.previous);
+        self.outer.copy_from_slice(&self.previous_outer);
+        self.jacobian.copy_from_slice(&self.previous_jacobian);
+        self.floating.now.fill(false);
+        (self.evaluations, self.fresh, self.short) = (0, true, true);
     }
 
     /// The next iteration starts at the previous solution.

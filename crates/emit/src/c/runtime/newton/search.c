@@ -1,3 +1,9 @@
+//item ha_is_below
+static int ha_is_below($real a)
+{
+    return a < $0.0 || (a == $0.0 && $1.0 / a < $0.0);
+}
+
 //if newton_single
 //item ha_scan_distances
 /* Distances from tiny to huge. */
@@ -14,12 +20,6 @@ static int ha_residual_at(ha_model *m, ha_newton *w, $real at, $real *residual)
     finite = $ha_evaluate(m, w, w->trial);
     *residual = w->right[0];
     return finite;
-}
-
-//item ha_is_below
-static int ha_is_below($real a)
-{
-    return a < $0.0 || (a == $0.0 && $1.0 / a < $0.0);
 }
 
 //item ha_bisect_residual
@@ -163,12 +163,51 @@ static int ha_search(ha_model *m, ha_newton *w)
 //end
 }
 
+//item ha_same
+/* Whether values are the same, zeros with their signs. */
+static int ha_same(const $real *a, const $real *b, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        if (!(a[i] == b[i]) || $ha_is_below(a[i]) != $ha_is_below(b[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+//item ha_has_root
+/* Whether the root is known: that found last, or the previous solution, where the block reads what it read then. */
+static int ha_has_root(ha_model *m, const ha_newton *w, int number, const $real *o)
+{
+    const int reads = w->block->reads;
+    if (m->fresh[number] && $ha_same(o, w->outer, reads)) {
+        return 1;
+    }
+    if (!m->settled[number] || !$ha_same(o, w->previous_outer, reads)) {
+        return 0;
+    }
+    $ha_copy(w->x, w->previous, w->n);
+    $ha_copy(w->outer, w->previous_outer, reads);
+    $ha_copy(w->jacobian, w->previous_jacobian, w->entries);
+    m->fresh[number] = 1;
+//if sought_positions
+    m->motion_short[number] = 1;
+//end
+    return 1;
+}
+
 //item ha_find_root
 /* The root of a block that continues its previous solution, at a start or an event any root; o: what the block reads. */
 static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
 {
     ha_newton w = $ha_newton_of(m, number);
     int status;
+    if ($ha_has_root(m, &w, number, o)) {
+        $ha_copy(x, w.x, w.n);
+        return $MODEL_OK;
+    }
+    m->fresh[number] = 0;
     $ha_copy(w.outer, o, w.block->reads);
     $ha_copy(w.present, o, w.block->reads);
     $ha_fill(w.floor, $0.0, w.n);
@@ -187,6 +226,7 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     }
     $ha_copy(w.jacobian, w.matrix, w.entries);
     $ha_copy(x, w.x, w.n);
+    m->fresh[number] = !w.block->conditions;
     return $MODEL_OK;
 }
 

@@ -10,6 +10,8 @@ typedef struct {
     int reads;
     /* First place of its memory in m->memory. */
     int memory;
+    /* Whether its code reads conditions, which may be held or not. */
+    int conditions;
 //if sought_positions
     /* Whether its unknowns are positions that constraints determine. */
     int position;
@@ -193,6 +195,17 @@ static void ha_newton_accept(ha_model *m, int number)
     $ha_copy(w.previous, w.x, w.n);
     $ha_copy(w.previous_outer, w.outer, w.block->reads);
     $ha_copy(w.previous_jacobian, w.jacobian, w.entries);
+//if single
+    /* Of so few digits, it is refined where it is sought again. */
+    m->fresh[number] = 0;
+    m->settled[number] = 0;
+//else
+    /* Where the block reads the same, it goes on from itself. */
+    m->settled[number] = m->fresh[number];
+//end
     m->following[number] = 1;
+//if sought_positions
+    m->motion_short[number] = 1;
+//end
 }
 
