@@ -39,8 +39,14 @@ impl Repetition {
         self.length * self.turns.saturating_sub(1)
     }
 
-    fn pays(&self) -> bool {
+    /// Whether it is worth a loop.
+    pub fn pays(&self) -> bool {
         self.turns >= TURNS && self.spared() >= SPARED
+    }
+
+    /// Whether there may be one that is among so many steps.
+    pub fn may_pay(steps: usize) -> bool {
+        steps > SPARED
     }
 
     /// The repetition with this period between two steps, if it pays.
@@ -59,7 +65,7 @@ impl Code {
     /// There is not a kind for each step.
     pub fn repetitions(&self, kinds: &[u32]) -> Vec<Repetition> {
         assert_eq!(kinds.len(), self.steps.len(), "a kind for each step");
-        if kinds.len() < SPARED {
+        if !Repetition::may_pay(kinds.len()) {
             return Vec::new();
         }
         let reads = Reads::of(self);

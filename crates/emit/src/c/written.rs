@@ -30,6 +30,8 @@ impl Display for Series {
 pub(crate) enum Variable {
     /// What a call that may fail gives.
     Status,
+    /// The turn of a loop.
+    Turn,
     /// A value or a derivative.
     Number(Series),
     /// One of the temporaries on the way to it: letters and number tell them apart.
@@ -42,6 +44,7 @@ impl Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Variable::Status => f.write_str("status"),
+            Variable::Turn => f.write_str("k"),
             Variable::Number(series) => write!(f, "{series}"),
             Variable::Part(series, kind, at) => write!(f, "{series}_{kind}{at}"),
             Variable::Array(kind, step) => write!(f, "{kind}{step}"),
