@@ -2,7 +2,7 @@
 
 use halfarrow_compiler::program::{Arg, Repetition};
 
-use super::turns::{Operand, first_definition, operand, operands};
+use super::turns::{Operand, carried, first_definition, operand, operands};
 use super::{Body, Place, Writer};
 
 /// The place of a number that crosses.
@@ -24,6 +24,11 @@ impl Writer<'_> {
             }
         }
         let loops: Vec<Repetition> = chunks.iter().flatten().filter(|piece| piece.turns > 1).copied().collect();
+        for (c, piece) in chunks.iter().enumerate().flat_map(|(c, pieces)| pieces.iter().map(move |piece| (c, piece))) {
+            if piece.turns > 1 {
+                self.find_carried(f, c, *piece);
+            }
+        }
         // Rows of what turns read of turns before them first, so that these follow each other.
         for &r in &loops {
             let steps = r.first..r.first + r.length;
@@ -37,8 +42,8 @@ impl Writer<'_> {
             for &piece in pieces {
                 let steps = piece.first..piece.first + piece.length;
                 for args in steps.flat_map(|at| operands(f.code, piece, at)) {
-                    let varying = piece.turns > 1 && operand(f, piece, &args) == Operand::Varying;
-                    let of_turn = piece.turns > 1 && operand(f, piece, &args) == Operand::OfTurn;
+                    let how = if piece.turns > 1 { operand(f, piece, &args) } else { Operand::Same };
+                    let (varying, of_turn) = (how == Operand::Varying, how == Operand::OfTurn);
                     let args = if varying { &args[..] } else { &args[..1] };
                     for local in
                         args.iter().filter_map(|a| if let Arg::Local(i) = a { Some(i.0 as usize) } else { None })
@@ -56,12 +61,20 @@ impl Writer<'_> {
         if f.place[local] != usize::MAX {
             return;
         }
-        if f.home[local] == usize::MAX {
-            let at = f.definition[local];
-            let r = loops[loops.partition_point(|r| r.first <= at) - 1];
-            self.row(f, r, r.first + (at - r.first) % r.length, 0);
-        } else {
-            self.take(f, &[local]);
+        let at = f.definition[local];
+        let last = loops.partition_point(|r| r.first <= at).checked_sub(1);
+        match last.map(|last| loops[last]).filter(|r| at < r.end()) {
+            Some(r) => self.row(f, r, r.first + (at - r.first) % r.length, 0),
+            None => self.take(f, &[local]),
+        }
+    }
+
+    /// Values that go on from turn to turn are variables of their function, which hold those of the last turn behind the loop.
+    fn find_carried(&self, f: &mut Body, chunk: usize, r: Repetition) {
+        for local in carried(f, r).into_keys() {
+            let last = f.code.steps[f.definition[local] + (r.turns - 1) * r.length].defines()[0].0 as usize;
+            f.home[last] = chunk;
+            f.last_of.insert(last, local);
         }
     }
 
@@ -98,5 +111,5 @@ impl Writer<'_> {
 fn chain(f: &Body, r: Repetition, args: &[Arg]) -> Option<(usize, usize)> {
     let first = first_definition(f, r, args)?;
     let lead = r.first.checked_sub(first)?.div_ceil(r.length);
-    (lead > 0 && lead < r.turns).then_some((first + lead * r.length, lead))
+    (lead > 1 && lead < r.turns).then_some((first + lead * r.length, lead))
 }

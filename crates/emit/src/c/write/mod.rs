@@ -168,6 +168,7 @@ impl<'a> Writer<'a> {
             place: vec![usize::MAX; n],
             rate_place: vec![usize::MAX; n],
             chunk: 0,
+            last_of: FxHashMap::default(),
             turning: None,
             tables: Tables::default(),
             outputs,

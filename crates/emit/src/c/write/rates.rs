@@ -59,7 +59,7 @@ impl Writer<'_> {
         let (spot, is_wide) = self.rate_spot(f, a)?;
         let rate = match a {
             Arg::Local(local) if f.is_variable(local.0 as usize) => {
-                written!("{}", Variable::Number(Series::Rate(local.0)))
+                written!("{}", f.variables(local.0 as usize)[1])
             }
             _ => spot.written(self.precision_of(is_wide)),
         };

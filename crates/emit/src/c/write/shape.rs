@@ -4,8 +4,9 @@ use halfarrow_compiler::program::{Arg, Code, Repetition, Step, Value};
 use rustc_hash::FxHashMap;
 
 use super::place::Tables;
+use super::turns::before;
 use crate::c::function::Parameter;
-use crate::c::written::{Line, Part, Variable, Written, written};
+use crate::c::written::{Line, Part, Series, Variable, Written, written};
 
 /// How a function is called.
 #[derive(Debug, Clone, Copy)]
@@ -81,6 +82,8 @@ pub(in crate::c) struct Body<'c> {
     pub(super) place: Vec<usize>,
     pub(super) rate_place: Vec<usize>,
     pub(super) chunk: usize,
+    /// What in the last turn of a loop is the last value of what goes on from turn to turn: of which local of the first turn.
+    pub(super) last_of: FxHashMap<usize, usize>,
     /// The loop that is being written.
     pub(super) turning: Option<Repetition>,
     /// What loops of this chunk read.
@@ -118,6 +121,14 @@ impl Body<'_> {
         self.home[local] == self.chunk || self.turning.as_ref().is_some_and(of_this_turn)
     }
 
+    /// The variables that hold a local and its derivative.
+    pub(super) fn variables(&self, local: usize) -> [Variable; 2] {
+        match self.last_of.get(&local) {
+            Some(&first) => before(first),
+            None => [Series::Value(local as u32), Series::Rate(local as u32)].map(Variable::Number),
+        }
+    }
+
     /// A step in all turns of the loop that is being written, or alone.
     pub(super) fn turns_of(&self, at: usize) -> impl Iterator<Item = &Step> {
         let (length, turns) = self.turning.map_or((1, 1), |r| (r.length, r.turns));
@@ -127,7 +138,7 @@ impl Body<'_> {
     /// Whether what is computed by now first has this value; what no chunk computes stands in the last one.
     pub(super) fn is_here(&self, a: Arg, chunks: usize) -> bool {
         match a {
-            Arg::Local(i) => self.home[i.0 as usize] == self.chunk,
+            Arg::Local(i) => self.home[i.0 as usize] == self.chunk && !self.last_of.contains_key(&(i.0 as usize)),
             _ => self.chunk + 1 == chunks,
         }
     }

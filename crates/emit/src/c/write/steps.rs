@@ -156,7 +156,7 @@ impl Writer<'_> {
         let (spot, is_wide) = self.spot(f, a, wide);
         let value = match a {
             Arg::Local(local) if f.is_variable(local.0 as usize) => {
-                written!("{}", Variable::Number(Series::Value(local.0)))
+                written!("{}", f.variables(local.0 as usize)[0])
             }
             _ => spot.written(self.precision_of(is_wide)),
         };

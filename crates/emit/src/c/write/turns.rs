@@ -3,10 +3,11 @@
 use halfarrow_compiler::algebra::Function as Elementary;
 use halfarrow_compiler::program::{Arg, Code, Method, Op, Repetition, Step};
 use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 use super::steps::{turns, what_fails};
 use super::{Body, Place, Reading, Spot, Writer};
-use crate::c::written::{Line, Variable, Written, written};
+use crate::c::written::{Line, Series, Variable, Written, written};
 
 /// What a step does, and where what it reads stands: of its array, whether in double precision, the array of its derivative.
 type Class = (&'static str, bool, Option<&'static str>);
@@ -40,6 +41,8 @@ pub(super) enum Operand {
     OfTurn,
     /// It is the same in all turns.
     Same,
+    /// It is what the turn before has found: in all turns this local of the first one.
+    OfTurnBefore(usize),
     /// Another in each turn.
     Varying,
 }
@@ -64,6 +67,11 @@ pub(super) fn operands(code: &Code, r: Repetition, at: usize) -> Vec<Vec<Arg>> {
 pub(super) fn operand(f: &Body, r: Repetition, args: &[Arg]) -> Operand {
     match first_definition(f, r, args) {
         Some(at) if (r.first..r.first + r.length).contains(&at) => return Operand::OfTurn,
+        Some(at) if at < r.first && at + r.length >= r.first => match (args[0], args.get(1)) {
+            // What stands before the loop may be one of several that a step finds.
+            (_, Some(Arg::Local(next))) => return Operand::OfTurnBefore(next.0 as usize),
+            _ => {}
+        },
         _ => {}
     }
     let of_loop = |i: usize| (r.first..r.end()).contains(&f.definition[i]);
@@ -143,9 +151,12 @@ impl Writer<'_> {
         let angles = std::mem::replace(&mut f.turns, common_angles(f.code, r));
         (r.first..r.first + r.length).for_each(|at| self.step(f, at));
         (r.first..r.first + r.length).for_each(|at| self.outputs_of_turn(f, at, places));
+        let carried = carried(f, r);
+        carried.keys().for_each(|&local| go_on(f, local));
         f.turns = angles;
         f.turning = None;
         let body = std::mem::replace(&mut f.lines, before);
+        carried.into_iter().for_each(|(local, start)| self.begin(f, local, start));
         self.in_loop(f, r.turns, body);
     }
 
@@ -167,7 +178,13 @@ impl Writer<'_> {
         let numbers: Vec<usize> = f.turns_of(at).map(what_fails).collect();
         let mut reads = Reading { which: f.tables.index(&numbers), values: Vec::new(), rates: Vec::new() };
         for args in operands(f.code, r, at) {
-            if operand(f, r, &args) == Operand::Varying {
+            let how = operand(f, r, &args);
+            if let Operand::OfTurnBefore(local) = how {
+                let [value, rate] = before(local);
+                reads.values.push(self.cast(written!("{}", value), f.wide[local], wide));
+                let moves = f.moves[local];
+                reads.rates.push(moves.then(|| self.cast(written!("{}", rate), f.wide[local], wide_rate)));
+            } else if how == Operand::Varying {
                 let spots = args.iter().map(|&a| self.spot(f, a, wide)).collect();
                 reads.values.push(self.series(f, spots, wide));
                 let rates: Option<Vec<(Spot, bool)>> = args.iter().map(|&a| self.rate_spot(f, a)).collect();
@@ -178,6 +195,18 @@ impl Writer<'_> {
             }
         }
         reads
+    }
+
+    /// Declares what the turn before has found of a local, as the first turn reads it.
+    fn begin(&self, f: &mut Body, local: usize, start: Arg) {
+        let wide = f.wide[local];
+        let kind = self.precision_of(wide).kind();
+        let [value, rate] = before(local);
+        let start_value = self.arg(f, start, wide);
+        f.constant(value, written!("    {} {} = {};", kind, value.to_string(), start_value), 1);
+        if let Some(start_rate) = self.rate(f, start, wide).filter(|_| f.moves[local]) {
+            f.constant(rate, written!("    {} {} = {};", kind, rate.to_string(), start_rate), 1);
+        }
     }
 
     /// What stands in these places in the turns of a loop, or in the one place where there is no loop.
@@ -216,6 +245,30 @@ impl Writer<'_> {
                 f.assign(&place, &rate);
             }
         }
+    }
+}
+
+/// What turns read of the turn before, with what the first one reads.
+pub(super) fn carried(f: &Body, r: Repetition) -> BTreeMap<usize, Arg> {
+    let all = (r.first..r.first + r.length).flat_map(|at| operands(f.code, r, at));
+    let of = |args: Vec<Arg>| match operand(f, r, &args) {
+        Operand::OfTurnBefore(local) => Some((local, args[0])),
+        _ => None,
+    };
+    all.filter_map(of).collect()
+}
+
+/// What was found of a local in the turn before, and its derivative.
+pub(super) fn before(local: usize) -> [Variable; 2] {
+    let local = local as u32;
+    [Series::Before(local), Series::RateBefore(local)].map(Variable::Number)
+}
+
+/// Keeps a value, and its derivative, for the next turn.
+fn go_on(f: &mut Body, local: usize) {
+    let found = [Series::Value(local as u32), Series::Rate(local as u32)].map(Variable::Number);
+    for (to, from) in before(local).into_iter().zip(found).take(1 + usize::from(f.moves[local])) {
+        f.constant(to, written!("    {} = {};", to.to_string(), from), 0);
     }
 }
 
