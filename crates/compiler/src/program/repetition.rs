@@ -151,13 +151,11 @@ fn largest_first(candidates: Vec<(Repetition, usize)>, steps: usize) -> Vec<(Rep
 /// The longest part of some steps of which none is taken.
 fn free_part(taken: &[bool], first: usize, end: usize) -> (usize, usize) {
     let (mut best, mut from) = ((first, first), first);
-    for at in first..=end {
-        if at == end || taken[at] {
-            if at - from > best.1 - best.0 {
-                best = (from, at);
-            }
-            from = at + 1;
+    for stop in (first..end).filter(|&at| taken[at]).chain([end]) {
+        if stop - from > best.1 - best.0 {
+            best = (from, stop);
         }
+        from = stop + 1;
     }
     best
 }
