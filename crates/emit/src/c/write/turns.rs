@@ -67,11 +67,12 @@ pub(super) fn operands(code: &Code, r: Repetition, at: usize) -> Vec<Vec<Arg>> {
 pub(super) fn operand(f: &Body, r: Repetition, args: &[Arg]) -> Operand {
     match first_definition(f, r, args) {
         Some(at) if (r.first..r.first + r.length).contains(&at) => return Operand::OfTurn,
-        Some(at) if at < r.first && at + r.length >= r.first => match (args[0], args.get(1)) {
+        Some(at) if at < r.first && at + r.length >= r.first => {
             // What stands before the loop may be one of several that a step finds.
-            (_, Some(Arg::Local(next))) => return Operand::OfTurnBefore(next.0 as usize),
-            _ => {}
-        },
+            if let Some(Arg::Local(next)) = args.get(1) {
+                return Operand::OfTurnBefore(next.0 as usize);
+            }
+        }
         _ => {}
     }
     let of_loop = |i: usize| (r.first..r.end()).contains(&f.definition[i]);
