@@ -8,5 +8,7 @@ mod c;
 mod fmu;
 #[path = "obligations.rs"]
 mod obligations;
+#[path = "rolled.rs"]
+mod rolled;
 #[path = "single.rs"]
 mod single;

@@ -4,15 +4,13 @@
 
 use crate::common;
 
-use common::{Exported, Rows, build, build_with, diodes, export, models, own, wishbone};
+use common::{Exported, Rows, STEPS, build, build_with, diodes, export, models, own, wishbone};
 use halfarrow_compiler::algebra::math;
 use halfarrow_emit::Method;
 use halfarrow_sim::{Events, System};
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
-
-const STEPS: usize = 150;
 
 #[test]
 fn c_does_what_the_interpreter_does() {
@@ -299,7 +297,7 @@ fn c_is_clean() {
 }
 
 /// Builds and runs models and compares each with what is wanted of it.
-fn check(name: &str, all: &[Exported], driver: &str, wanted: impl Fn(&Exported) -> (Rows, Option<String>)) {
+pub fn check(name: &str, all: &[Exported], driver: &str, wanted: impl Fn(&Exported) -> (Rows, Option<String>)) {
     let output = build(name, all, driver).run(&[]);
     let mut faults = Vec::new();
     let mut texts = output.split("== ").skip(1);
@@ -314,7 +312,7 @@ fn check(name: &str, all: &[Exported], driver: &str, wanted: impl Fn(&Exported) 
 
 /// A program that runs all models and prints the bits of their outputs; with the number of a parameter for each, and its
 /// value, if it is not below 0.
-fn driver(all: &[Exported], set: &dyn Fn(&Exported) -> (i32, f64)) -> String {
+pub fn driver(all: &[Exported], set: &dyn Fn(&Exported) -> (i32, f64)) -> String {
     let mut text = String::from(common::DRIVER);
     for one in all {
         let name = &one.written.name;

@@ -32,6 +32,7 @@ mod nearness;
 mod operations;
 mod print;
 mod ratios;
+mod repetition;
 mod routine;
 mod schedule;
 mod sharing;
@@ -45,6 +46,7 @@ pub use events::{Action, Bound, Clause, Impulse, Jumps, Measure, SetValued, Targ
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
 pub use ratios::{Ratios, Told};
+pub use repetition::Repetition;
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;
 pub use start::StartGroup;

@@ -151,7 +151,7 @@ impl Writer<'_> {
     fn quotient(&self, f: &mut Body, solve: &Solve, reads: &Reading, moves: bool) {
         let (a, d) = (&reads.values[..], &reads.rates[..]);
         let vanishes = written!("!{}({})", needed("ha_is_pivot"), a[0]);
-        f.lines.push(self.fail_if(&vanishes, "SINGULAR", &solve.block.0, f.shape.time));
+        f.lines.push(self.fail_if(&vanishes, "SINGULAR", &reads.which, f.shape.time));
         let out = solve.unknowns[0].0;
         if !f.read[out as usize] {
             return;

@@ -6,7 +6,8 @@ use halfarrow_compiler::program::{Op, Program, Reads, Value};
 use rustc_hash::FxHashMap;
 
 use super::write::{Moving, TimeRate};
-use super::written::{Written, written};
+use super::write::{Place, Spot};
+use super::written::Written;
 use crate::Real;
 
 /// The places of givens: parameters, what follows from them, time, inputs, held signals, conserved constants, states,
@@ -59,34 +60,45 @@ impl<'a> Givens<'a> {
 
     /// A value in C.
     pub fn written(&self, value: Value) -> Written {
-        match self.program.values.op(value) {
-            Op::Constant(bits) => Written::of(self.real.number(bits.number())),
-            Op::Parameter(i) => written!("m->p[{}]", i),
-            Op::Time => Written::of("t"),
-            Op::Input(i) => written!("m->u[{}]", i),
-            Op::Held(i) => written!("m->z[{}]", i),
-            Op::Conserved(i) => written!("m->k[{}]", i),
-            Op::State(i) => written!("x[{}]", i),
-            Op::Solution(..) if self.positions.contains_key(&value) => {
-                written!("m->positions[{}]", self.positions[&value])
-            }
-            _ => written!("m->c[{}]", self.derived[&value]),
-        }
+        self.spot(value).written(self.real)
     }
 
     /// A value in C, in double precision.
     pub fn wide_written(&self, value: Value) -> Written {
+        let (spot, wide) = self.wide_spot(value);
+        let real = if wide { Real::Double } else { self.real };
+        super::write::cast(spot.written(real), real, Real::Double)
+    }
+
+    /// Where a value stands.
+    pub fn spot(&self, value: Value) -> Spot {
+        let place = |array, index| Spot::Place(Place { array, index });
         match self.program.values.op(value) {
-            _ if self.real == Real::Double => self.written(value),
-            Op::Constant(bits) => Written::of(Real::Double.number(bits.number())),
-            Op::Time => self.written(value),
-            Op::Parameter(i) => written!("m->p_exact[{}]", i),
+            Op::Constant(bits) => Spot::Number(bits.number()),
+            Op::Parameter(i) => place("m->p", i as usize),
+            Op::Time => Spot::Written(Written::of("t")),
+            Op::Input(i) => place("m->u", i as usize),
+            Op::Held(i) => place("m->z", i as usize),
+            Op::Conserved(i) => place("m->k", i as usize),
+            Op::State(i) => place("x", i as usize),
+            Op::Solution(..) if self.positions.contains_key(&value) => place("m->positions", self.positions[&value]),
+            _ => place("m->c", self.derived[&value]),
+        }
+    }
+
+    /// Where a value stands in double precision, or in that of real numbers if it does not; and whether it does.
+    pub fn wide_spot(&self, value: Value) -> (Spot, bool) {
+        let place = |array, index| (Spot::Place(Place { array, index }), true);
+        match self.program.values.op(value) {
+            _ if self.real == Real::Double => (self.spot(value), true),
+            Op::Constant(_) | Op::Time => (self.spot(value), true),
+            Op::Parameter(i) => place("m->p_exact", i as usize),
             _ if self.derived.contains_key(&value) => {
                 let mut exact = self.exact.borrow_mut();
                 let next = exact.len();
-                written!("m->c_exact[{}]", *exact.entry(value).or_insert(next))
+                place("m->c_exact", *exact.entry(value).or_insert(next))
             }
-            _ => written!("({}){}", Real::Double.kind(), self.written(value)),
+            _ => (self.spot(value), false),
         }
     }
 
@@ -114,17 +126,17 @@ impl<'a> Givens<'a> {
         [1, held, conserved, states, positions, positions + p.positions.len()]
     }
 
-    /// Its derivative in C, if it moves.
-    pub fn rate(&self, value: Value, moving: Moving) -> Option<Written> {
+    /// Where its derivative stands, if it moves.
+    pub fn rate(&self, value: Value, moving: Moving) -> Option<Spot> {
         let place = self.direction(value)?;
         let moves = match self.program.values.op(value) {
-            Op::Time if moving.time == Some(TimeRate::One) => return Some(Written::of(self.real.number(1.0))),
+            Op::Time if moving.time == Some(TimeRate::One) => return Some(Spot::Number(1.0)),
             Op::Time => moving.time.is_some(),
             Op::Input(_) => moving.inputs,
             Op::Held(_) => moving.held,
             Op::Conserved(_) => moving.conserved,
             _ => moving.states,
         };
-        moves.then(|| written!("e[{}]", place))
+        moves.then_some(Spot::Place(Place { array: "e", index: place }))
     }
 }

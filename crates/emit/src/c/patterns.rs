@@ -90,8 +90,17 @@ fn order(text: &mut String, number: usize, factors: &SymbolicFactors, symmetric:
     });
     let name = format!("ha_order_{number}");
     let lists = names.join(", ");
-    *text += &format!("static const ha_order {name} = {{{}, {lists}, {mirror}}};\n", u8::from(factors.odd));
+    let paired = paired(factors);
+    *text += &format!("static const ha_order {name} = {{{}, {lists}, {mirror}, {paired}}};\n", u8::from(factors.odd));
     name
+}
+
+/// How many of the first places, two by two, have one entry above the diagonal each, two places on: the ends of a chain
+/// that is eliminated from both of them.
+fn paired(factors: &SymbolicFactors) -> usize {
+    let upper = &factors.upper;
+    let is_link = |place: usize| upper.row(place).len() == 1 && upper.columns()[place] as usize == place + 2;
+    (0..factors.rows.len()).take_while(|&place| is_link(place)).count() / 2 * 2
 }
 
 fn table(name: &str, values: &[u32]) -> String {

@@ -11,6 +11,9 @@ pub(crate) enum Series {
     Value(u32),
     /// The derivative of one.
     Rate(u32),
+    /// What a value, or its derivative, was in the turn before.
+    Before(u32),
+    RateBefore(u32),
     /// An elimination that is written out.
     Elimination,
 }
@@ -20,6 +23,8 @@ impl Display for Series {
         match self {
             Series::Value(i) => write!(f, "v{i}"),
             Series::Rate(i) => write!(f, "d{i}"),
+            Series::Before(i) => write!(f, "b{i}"),
+            Series::RateBefore(i) => write!(f, "r{i}"),
             Series::Elimination => f.write_str("e"),
         }
     }
@@ -30,6 +35,8 @@ impl Display for Series {
 pub(crate) enum Variable {
     /// What a call that may fail gives.
     Status,
+    /// The turn of a loop.
+    Turn,
     /// A value or a derivative.
     Number(Series),
     /// One of the temporaries on the way to it: letters and number tell them apart.
@@ -42,6 +49,7 @@ impl Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Variable::Status => f.write_str("status"),
+            Variable::Turn => f.write_str("k"),
             Variable::Number(series) => write!(f, "{series}"),
             Variable::Part(series, kind, at) => write!(f, "{series}_{kind}{at}"),
             Variable::Array(kind, step) => write!(f, "{kind}{step}"),
@@ -183,7 +191,7 @@ pub(super) use written;
 #[derive(Debug, Clone)]
 pub(super) struct Line {
     pub written: Written,
-    /// The variable that it declares, and does nothing else.
+    /// The variable that it declares or sets, and does nothing else.
     pub declares: Option<Variable>,
     /// How many numbers it takes of the stack.
     pub numbers: usize,
@@ -201,18 +209,27 @@ impl Line {
     }
 }
 
-/// The lines without declarations of what no later line reads.
+/// The lines without those that only set what no line reads that stays; what a turn of a loop leaves to the next one is read
+/// by lines before.
 pub(super) fn without_the_unread(lines: Vec<Line>) -> Vec<Line> {
-    let mut read = rustc_hash::FxHashSet::default();
-    let mut kept = Vec::with_capacity(lines.len());
-    for line in lines.into_iter().rev() {
-        if line.declares.is_none_or(|variable| read.contains(&variable)) {
-            read.extend(line.written.notes.reads.iter().copied());
-            kept.push(line);
+    let mut left_to_turns = rustc_hash::FxHashSet::default();
+    loop {
+        let mut read = rustc_hash::FxHashSet::default();
+        let mut stays = vec![true; lines.len()];
+        for (line, stays) in lines.iter().zip(&mut stays).rev() {
+            *stays = line.declares.is_none_or(|variable| read.contains(&variable) || left_to_turns.contains(&variable));
+            if *stays {
+                read.extend(line.written.notes.reads.iter().copied());
+            }
+        }
+        let gone = lines.iter().zip(&stays).filter(|(_, stays)| !**stays).filter_map(|(line, _)| line.declares);
+        let known = left_to_turns.len();
+        left_to_turns.extend(gone.filter(|variable| read.contains(variable)));
+        if left_to_turns.len() == known {
+            let mut stays = stays.into_iter();
+            return lines.into_iter().filter(|_| stays.next() == Some(true)).collect();
         }
     }
-    kept.reverse();
-    kept
 }
 
 #[cfg(test)]
@@ -235,5 +252,24 @@ mod tests {
         ];
         let kept: Vec<String> = without_the_unread(lines).into_iter().map(|l| l.written.text).collect();
         assert_eq!(kept, ["const double v1 = x[0];", "out[0] = v1;"]);
+    }
+
+    #[test]
+    fn what_a_turn_leaves_to_the_next_one_stays_if_that_reads_it() {
+        let [v, w] = [1, 2].map(|i| Variable::Number(Series::Value(i)));
+        let [b, c] = [1, 2].map(|i| Variable::Number(Series::Before(i)));
+        let set = |to: Variable, from: Variable| Line::constant(to, written!("{} = {};", to.to_string(), from), 0);
+        // w goes round in a circle, out of which nothing comes.
+        let lines = vec![
+            Line::constant(b, Written::of("b1 = 0;"), 1),
+            Line::constant(c, Written::of("b2 = 0;"), 1),
+            Line::constant(v, written!("v1 = {};", b), 1),
+            Line::constant(w, written!("v2 = {} + {};", c, v), 1),
+            Line::new(written!("out = {};", v), 0),
+            set(b, v),
+            set(c, w),
+        ];
+        let kept: Vec<String> = without_the_unread(lines).into_iter().map(|l| l.written.text).collect();
+        assert_eq!(kept, ["b1 = 0;", "v1 = b1;", "out = v1;", "b1 = v1;"]);
     }
 }

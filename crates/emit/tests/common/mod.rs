@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 pub const DRIVER: &str = include_str!("driver.c");
+/// Steps of the runs that are compared.
+pub const STEPS: usize = 150;
 pub const FLAGS: [&str; 7] =
     ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"];
 

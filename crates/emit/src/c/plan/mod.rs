@@ -22,7 +22,7 @@ use super::cost::{MOST_EVENTS, OperationCount};
 use super::function::Function;
 use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
-use super::write::{Moving, Shape, TimeRate, Writer};
+use super::write::{Moving, Place, Shape, TimeRate, Writer};
 use crate::EmitError;
 pub(super) use events::EventTables;
 pub(super) use modes::{ModeTables, Modes};
@@ -176,7 +176,6 @@ impl<'a> Plan<'a> {
         let used: Vec<BlockId> = blocks.keys().copied().collect();
         let patterns = Rc::clone(&self.patterns);
         let mut writer = Writer::new(self.export, &self.name, &used, &patterns);
-        let values = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
         let numbers = |r: &Routine| newton_of(&r.code).map(|s| s.block).collect::<Vec<_>>();
         self.rates_blocks = numbers(&routines.rates);
         self.shown_blocks = numbers(&routines.observe);
@@ -194,7 +193,7 @@ impl<'a> Plan<'a> {
         ];
         let plain = |writer: &mut Writer, name: &str, routine: &Routine| {
             let n = routine.code.outputs.len();
-            writer.function(name, PLAIN, (&routine.code, &[]), (&values("out", n), &[]))
+            writer.function(name, PLAIN, (&routine.code, &[]), (&Place::first("out", n), &[]))
         };
         functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
@@ -224,7 +223,7 @@ impl<'a> Plan<'a> {
         let along = |writer: &mut Writer, name: &str, shape: Shape, routine: &Routine, moving: Moving| {
             let n = routine.code.outputs.len();
             let shape = Shape { along: Some(moving), ..shape };
-            writer.function(name, shape, (&routine.code, &[]), (&values("out", n), &values("rates", n)))
+            writer.function(name, shape, (&routine.code, &[]), (&Place::first("out", n), &Place::first("rates", n)))
         };
         let runs = Moving { time: Some(TimeRate::One), ..Moving::default() };
         functions.extend(along(&mut writer, "ha_clock_code", CLOCK, &routines.clock, runs));

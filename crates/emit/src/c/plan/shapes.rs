@@ -6,7 +6,7 @@ use halfarrow_compiler::sparse::Pattern;
 use crate::Real;
 use crate::c::function::{self, Function, Gives, Parameter};
 use crate::c::terms;
-use crate::c::write::{Moving, Shape, Time, Writer};
+use crate::c::write::{Moving, Place, Shape, Time, Writer};
 use crate::c::written::{Line, Written, written};
 
 pub(super) const PLAIN: Shape = Shape {
@@ -78,18 +78,17 @@ pub(super) fn of_parameters(writer: &Writer, name: &str, values: impl Iterator<I
 pub(super) fn block_functions(writer: &mut Writer, number: usize, pattern: &Pattern, code: &Code) -> Vec<Function> {
     let n = pattern.size();
     let code = &code.near((0..n).flat_map(|row| std::iter::once(row).chain(pattern.row(row).map(move |e| n + e))));
-    let list = |prefix: &str, n: usize| -> Vec<String> { (0..n).map(|i| format!("{prefix}[{i}]")).collect() };
-    let mut values = list("right", n);
-    values.extend(list("matrix", code.outputs.len() - n));
+    let mut values = Place::first("right", n);
+    values.extend(Place::first("matrix", code.outputs.len() - n));
     let mut functions = writer.function(&format!("ha_block_{number}"), BLOCK, (code, &[]), (&values, &[]));
     let sums = terms::terms_of(code, n);
     let name = format!("ha_block_{number}_terms");
-    functions.extend(writer.function(&name, BLOCK_TERMS, (&sums, &[]), (&list("terms", n), &[])));
+    functions.extend(writer.function(&name, BLOCK_TERMS, (&sums, &[]), (&Place::first("terms", n), &[])));
     let residuals = Code { outputs: code.outputs[..n].to_vec(), ..code.clone() };
     let residuals = terms::without_the_unread(residuals);
     let along = Shape { along: Some(Moving { outer: true, ..Moving::default() }), ..BLOCK_ALONG };
     let name = format!("ha_block_{number}_along");
-    functions.extend(writer.function(&name, along, (&residuals, &[]), (&[], &list("rates", n))));
+    functions.extend(writer.function(&name, along, (&residuals, &[]), (&[], &Place::first("rates", n))));
     functions
 }
 

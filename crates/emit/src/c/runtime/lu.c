@@ -19,6 +19,8 @@ typedef struct {
     const int *positions;
     /* Of a matrix that is symmetric whatever its values: for each entry of lower the one of upper that mirrors it; else NULL. */
     const int *mirror;
+    /* How many of the first places, two by two, have one entry of upper each, two places on: a chain from both its ends. */
+    int paired;
 } ha_order;
 
 //end
@@ -440,7 +442,7 @@ static void ha_sparse_substitute_back(const ha_lu *l, $real *b)
     const ha_order *o = l->pattern->order;
     int place;
     int i;
-    for (place = l->n - 1; place >= 0; --place) {
+    for (place = l->n - 1; place >= o->paired; --place) {
         $real left = l->work[place];
         for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
             const $real product = l->upper[i] * l->work[o->upper[i]];
@@ -449,6 +451,43 @@ static void ha_sparse_substitute_back(const ha_lu *l, $real *b)
         l->work[place] = left * l->inverse[place];
         b[o->columns[place]] = l->work[place];
     }
+    if (o->paired > 0) {
+        /* What is found last stays in registers. */
+        $real one = l->work[o->paired];
+        $real other = l->work[o->paired + 1];
+        for (place = o->paired - 2; place >= 0; place -= 2) {
+            const $real of_one = l->upper[place] * one;
+            const $real of_other = l->upper[place + 1] * other;
+            const $real left = l->work[place] - of_one;
+            const $real right = l->work[place + 1] - of_other;
+            one = left * l->inverse[place];
+            other = right * l->inverse[place + 1];
+            b[o->columns[place]] = one;
+            b[o->columns[place + 1]] = other;
+        }
+    }
+}
+
+//item ha_sparse_pairs
+/* The first places of a chain, from both its ends at once: what is left of the right side stays in registers. */
+static void ha_sparse_pairs(const ha_lu *l)
+{
+    const int paired = l->pattern->order->paired;
+    $real one = l->work[0];
+    $real other = l->work[1];
+    int place;
+    for (place = 0; place < paired; place += 2) {
+        const $real done = one * l->inverse[place];
+        const $real done_too = other * l->inverse[place + 1];
+        const $real of_one = l->upper[place] * done;
+        const $real of_other = l->upper[place + 1] * done_too;
+        l->work[place] = one;
+        l->work[place + 1] = other;
+        one = l->work[place + 2] - of_one;
+        other = l->work[place + 3] - of_other;
+    }
+    l->work[paired] = one;
+    l->work[paired + 1] = other;
 }
 
 //item ha_sparse_solve_definite
@@ -460,7 +499,10 @@ static void ha_sparse_solve_definite(const ha_lu *l, $real *b)
     for (place = 0; place < l->n; ++place) {
         l->work[place] = b[o->rows[place]];
     }
-    for (place = 0; place < l->n; ++place) {
+    if (o->paired > 0) {
+        $ha_sparse_pairs(l);
+    }
+    for (place = o->paired; place < l->n; ++place) {
         const $real done = l->work[place] * l->inverse[place];
         for (i = o->upper_starts[place]; i < o->upper_starts[place + 1]; ++i) {
             const $real product = l->upper[i] * done;

@@ -1,14 +1,20 @@
-//! Steps as C functions: straight lines in chunks, what crosses from one to the next in the model's work array.
+//! Steps as C functions: straight lines and loops in chunks, what crosses from one to the next in the model's work array.
 
+mod copies;
+mod crossing;
+mod place;
 mod precision;
 mod rates;
 mod shape;
 mod steps;
+mod turns;
 
+pub(super) use place::{Place, Spot};
+pub(super) use precision::cast;
 pub(super) use shape::{Body, Moving, Reading, Shape, Time, TimeRate};
 
 use halfarrow_compiler::program::elimination::products;
-use halfarrow_compiler::program::{Arg, BlockId, Code, Local, Op, Program, Step, Value};
+use halfarrow_compiler::program::{Arg, BlockId, Code, Local, Op, Program, Repetition, Step, Value};
 use rustc_hash::FxHashMap;
 
 use super::Export;
@@ -19,6 +25,9 @@ use super::patterns::Patterns;
 use super::variables::Variables;
 use super::written::{Line, Needed, Part, Variable, Written, needed, without_the_unread, written};
 use crate::Real;
+use copies::Copied;
+use crossing::crossed;
+use place::Tables;
 use steps::turns;
 
 /// Steps in one C function: compilers take more than linear time for long ones.
@@ -71,17 +80,17 @@ impl<'a> Writer<'a> {
         name: &str,
         shape: Shape,
         (code, kept): (&Code, &[(u32, Value)]),
-        places: (&[String], &[String]),
+        places: (&[Place], &[Place]),
     ) -> Vec<Function> {
-        let chunks = self.chunks(&code.steps);
-        let mut f = self.body(shape, (code, kept), &chunks, !places.1.is_empty());
-        let (mut functions, mut place) = (Vec::new(), 0);
-        for (c, steps) in chunks.iter().enumerate() {
+        let mut f = self.body(shape, (code, kept), !places.1.is_empty());
+        let repetitions = self.repetitions(&f, places);
+        let chunks = self.chunks(code, &repetitions);
+        self.find_places(&mut f, &chunks);
+        let mut functions = Vec::new();
+        for (c, pieces) in chunks.iter().enumerate() {
             f.chunk = c;
-            f.turns = turns(steps);
-            steps.iter().zip(place..).for_each(|(step, at)| self.step(&mut f, step, at));
-            place += steps.len();
-            self.outputs(&mut f, code, places, chunks.len());
+            self.chunk(&mut f, pieces, places);
+            self.outputs(&mut f, places, chunks.len());
             let called = if chunks.len() == 1 { name.to_string() } else { format!("{name}_{c}") };
             let mut lines = without_the_unread(std::mem::take(&mut f.lines));
             lines.extend(shape.parameters.iter().map(|p| Line::new(written!("    (void){};", p.name()), 0)));
@@ -94,54 +103,80 @@ impl<'a> Writer<'a> {
         functions
     }
 
-    /// Steps that stand in one function; a block that is written out counts with what that takes.
-    fn chunks<'s>(&self, steps: &'s [Step]) -> Vec<&'s [Step]> {
-        let weight = |step: &Step| match step {
+    /// The steps of one function.
+    fn chunk(&self, f: &mut Body, pieces: &[Repetition], places: (&[Place], &[Place])) {
+        let code = f.code;
+        let plain = pieces.iter().filter(|piece| piece.turns == 1);
+        f.tables = Tables::default();
+        f.turns = turns(plain.flat_map(|piece| &code.steps[piece.first..piece.end()]));
+        for &piece in pieces {
+            match piece.turns {
+                1 => (piece.first..piece.end()).for_each(|at| self.step(f, at)),
+                _ => self.turn_loop(f, piece, places),
+            }
+        }
+    }
+
+    /// Steps that stand in one function: pieces of one turn, and loops. A block that is written out counts with what that
+    /// takes.
+    fn chunks(&self, code: &Code, repetitions: &[Repetition]) -> Vec<Vec<Repetition>> {
+        let weight = |at: usize| match &code.steps[at] {
             Step::Solve(solve) if self.is_written_out(solve) => products(&solve.pattern),
             _ => 1,
         };
-        let (mut chunks, mut from, mut size) = (Vec::new(), 0, 0);
-        for (at, step) in steps.iter().enumerate() {
-            size += weight(step);
+        let (mut chunks, mut size) = (vec![Vec::<Repetition>::new()], 0);
+        let mut put = |next: Repetition, weight: usize| {
             if size >= CHUNK {
-                chunks.push(&steps[from..=at]);
-                (from, size) = (at + 1, 0);
+                chunks.push(Vec::new());
+                size = 0;
             }
-        }
-        if from < steps.len() || chunks.is_empty() {
-            chunks.push(&steps[from..]);
+            size += weight;
+            match chunks.last_mut().expect("one").last_mut() {
+                Some(last) if last.turns == 1 && next.turns == 1 && last.end() == next.first => last.length += 1,
+                _ => chunks.last_mut().expect("one").push(next),
+            }
+        };
+        let mut at = 0;
+        let end = Repetition { first: code.steps.len(), length: 0, turns: 0 };
+        for &r in repetitions.iter().chain([&end]) {
+            (at..r.first).for_each(|first| put(Repetition { first, length: 1, turns: 1 }, weight(first)));
+            if r.turns > 0 {
+                put(r, (r.first..r.first + r.length).map(weight).sum());
+            }
+            at = r.end();
         }
         chunks
     }
 
-    /// A function that is to be written, with a home for each local.
-    fn body(&mut self, shape: Shape, (code, kept): (&Code, &[(u32, Value)]), chunks: &[&[Step]], rates: bool) -> Body {
-        let mut f = Body {
+    /// A function that is to be written.
+    fn body<'c>(&self, shape: Shape, (code, kept): (&'c Code, &[(u32, Value)]), rates: bool) -> Body<'c> {
+        let n = code.values.len();
+        let mut outputs = vec![Vec::new(); n];
+        for (i, a) in code.outputs.iter().enumerate() {
+            if let Arg::Local(local) = a {
+                outputs[local.0 as usize].push(i);
+            }
+        }
+        Body {
             shape,
+            code,
             moves: self.moves(code, shape, rates),
             wide: self.wide(code),
             read: read_of(code, kept),
-            home: vec![0; code.values.len()],
-            place: vec![usize::MAX; code.values.len()],
-            rate_place: vec![usize::MAX; code.values.len()],
+            home: vec![0; n],
+            definition: vec![0; n],
+            place: vec![usize::MAX; n],
+            rate_place: vec![usize::MAX; n],
             chunk: 0,
+            last_of: FxHashMap::default(),
+            turning: None,
+            tables: Tables::default(),
+            outputs,
             turns: FxHashMap::default(),
             names: self.variables.of_locals(code),
             kept: kept.iter().copied().collect(),
             lines: Vec::new(),
-        };
-        for (c, steps) in chunks.iter().enumerate() {
-            steps.iter().flat_map(Step::defines).for_each(|out| f.home[out.0 as usize] = c);
         }
-        for (c, steps) in chunks.iter().enumerate() {
-            for step in *steps {
-                step.for_each_read(|a| match a {
-                    Arg::Local(i) if f.home[i.0 as usize] != c => self.cross(&mut f, i.0 as usize),
-                    _ => {}
-                });
-            }
-        }
-        f
     }
 
     /// A function of these lines.
@@ -149,6 +184,9 @@ impl<'a> Writer<'a> {
         let gives = if shape.void { Gives::Nothing } else { Gives::Status };
         if lines.iter().any(|line| line.written.notes.reads.contains(&Variable::Status)) {
             lines.insert(0, Line::new(Written::of("    int status;"), 0));
+        }
+        if lines.iter().any(|line| line.written.notes.reads.contains(&Variable::Turn)) {
+            lines.insert(0, Line::new(Written::of("    int k;"), 0));
         }
         if !shape.void {
             lines.push(Line::new(written!("    return {}_OK;", self.capitals), 0));
@@ -174,52 +212,60 @@ impl<'a> Writer<'a> {
         )
     }
 
-    fn cross(&mut self, f: &mut Body, local: usize) {
-        if f.place[local] == usize::MAX {
-            let crossing = if f.wide[local] { &mut self.wide_crossing } else { &mut self.crossing };
-            f.place[local] = *crossing;
-            *crossing += 1;
-            if f.moves[local] {
-                f.rate_place[local] = *crossing;
-                *crossing += 1;
+    fn outputs(&self, f: &mut Body, (values, rates): (&[Place], &[Place]), chunks: usize) {
+        let wanted = f.code.outputs.iter().copied().enumerate();
+        let wanted: Vec<(usize, Arg)> = wanted.filter(|(_, a)| f.is_here(*a, chunks)).collect();
+        let source = |a: Arg| match a {
+            Arg::Local(_) => (Spot::Written(self.arg(f, a, f.shape.wide)), f.shape.wide),
+            _ => self.spot(f, a, f.shape.wide),
+        };
+        let moved = |a: Arg| match a {
+            Arg::Local(_) => (Spot::Written(self.rate_or_zero(f, a)), f.shape.wide),
+            _ => self.rate_spot(f, a).unwrap_or((Spot::Number(0.0), f.shape.wide)),
+        };
+        let of = |places: &[Place], source: &dyn Fn(Arg) -> (Spot, bool)| -> Vec<Copied> {
+            let there = wanted.iter().filter(|w| w.0 < places.len());
+            there.map(|&(i, a)| Copied { to: places[i], from: source(a) }).collect()
+        };
+        let (values, rates) = (of(values, &source), of(rates, &moved));
+        let mut lists = [copies::Runs::of(values), copies::Runs::of(rates)];
+        for at in 0..wanted.len() {
+            for list in &mut lists {
+                self.copy(f, list, at);
             }
         }
     }
 
-    fn outputs(&self, f: &mut Body, code: &Code, (values, rates): (&[String], &[String]), chunks: usize) {
-        let wanted: Vec<(usize, Arg)> =
-            code.outputs.iter().copied().enumerate().filter(|(_, a)| f.is_here(*a, chunks)).collect();
-        for (i, a) in wanted {
-            if let Some(place) = values.get(i) {
-                let value = self.arg(f, a, f.shape.wide);
-                f.assign(place, &value);
-            }
-            if let Some(place) = rates.get(i) {
-                let zero = || Written::of(self.precision_of(f.shape.wide).number(0.0));
-                let rate = self.rate(f, a, f.shape.wide).unwrap_or_else(zero);
-                f.assign(place, &rate);
-            }
-        }
+    /// The derivative, 0 where nothing moves.
+    fn rate_or_zero(&self, f: &Body, a: Arg) -> Written {
+        let zero = || Written::of(self.precision_of(f.shape.wide).number(0.0));
+        self.rate(f, a, f.shape.wide).unwrap_or_else(zero)
     }
 
     /// Puts what other routines and Newton blocks read where these find it, as soon as it is computed.
     fn keep(&self, f: &mut Body, out: u32) {
-        let Some(&given) = f.kept.get(&out) else { return };
+        if !f.kept.contains_key(&out) {
+            return;
+        }
+        let of = |step: &Step| f.kept[&step.defines()[0].0];
+        let all: Vec<Value> = f.turns_of(f.definition[out as usize]).map(of).collect();
         let a = Arg::Local(Local(out));
-        let (place, value) = (self.givens.written(given), self.arg(f, a, false));
-        f.assign(&place.text, &value);
+        let place = self.series(f, all.iter().map(|&given| (self.givens.spot(given), false)).collect(), false);
+        let value = self.arg(f, a, false);
+        f.assign(&place, &value);
         if self.real == Real::Float {
-            self.keep_exact(f, given, a);
+            self.keep_exact(f, &all, a);
         }
     }
 
     /// Keeps what follows from parameters in double precision too where that is read, and sees that it fits.
-    fn keep_exact(&self, f: &mut Body, given: Value, a: Arg) {
+    fn keep_exact(&self, f: &mut Body, given: &[Value], a: Arg) {
         let value = self.arg(f, a, true);
-        if self.givens.is_exact(given) {
-            f.assign(&self.givens.wide_written(given).text, &value);
+        if self.givens.is_exact(given[0]) {
+            let place = self.series(f, given.iter().map(|&given| self.givens.wide_spot(given)).collect(), true);
+            f.assign(&place, &value);
         }
-        let parameter = match self.program.values.op(given) {
+        let parameter = match self.program.values.op(given[0]) {
             Op::Parameter(i) => i as usize,
             _ => self.program.parameters.len(),
         };

@@ -58,9 +58,11 @@ impl Writer<'_> {
     }
 
     pub(super) fn cast(&self, value: Written, from_wide: bool, to_wide: bool) -> Written {
-        match (self.precision_of(from_wide), self.precision_of(to_wide)) {
-            (from, to) if from == to => value,
-            (_, to) => written!("({}){}", to.kind(), value),
-        }
+        cast(value, self.precision_of(from_wide), self.precision_of(to_wide))
     }
+}
+
+/// A value of one precision in another.
+pub(in crate::c) fn cast(value: Written, from: Real, to: Real) -> Written {
+    if from == to { value } else { written!("({}){}", to.kind(), value) }
 }

@@ -2,7 +2,7 @@
 
 use halfarrow_compiler::program::{Arg, Code, ConditionId, EventTrigger, Op, Step};
 
-use super::{Body, Moving, Reading, Shape, Writer};
+use super::{Body, Moving, Place, Reading, Shape, Spot, Writer, crossed};
 use crate::c::derivatives::Expressions;
 use crate::c::written::{Series, Variable, Written, written};
 
@@ -56,22 +56,28 @@ impl Writer<'_> {
 
     /// The derivative, if it moves.
     pub(super) fn rate(&self, f: &Body, a: Arg, wide: bool) -> Option<Written> {
-        let moving = f.shape.along?;
-        let (rate, is_wide) = match a {
-            Arg::Given(value) => (self.givens.rate(value, moving)?, false),
-            Arg::Local(local) if !f.moves[local.0 as usize] => return None,
-            Arg::Local(local) => {
-                let i = local.0 as usize;
-                let (place, is_wide) = (f.rate_place[i], f.wide[i]);
-                match f.home[i] == f.chunk {
-                    true => (written!("{}", Variable::Number(Series::Rate(local.0))), is_wide),
-                    false => (written!("m->{}[{}]", if is_wide { "wide" } else { "w" }, place), is_wide),
-                }
+        let (spot, is_wide) = self.rate_spot(f, a)?;
+        let rate = match a {
+            Arg::Local(local) if f.is_variable(local.0 as usize) => {
+                written!("{}", f.variables(local.0 as usize)[1])
             }
-            Arg::Outer(i) => (moving.outer.then(|| written!("e[{}]", i))?, false),
-            Arg::Guess(_) => return None,
+            _ => spot.written(self.precision_of(is_wide)),
         };
         Some(self.cast(rate, is_wide, wide))
+    }
+
+    /// Where the derivative stands, if it moves, and whether that is in double precision; of a variable, where it is kept.
+    pub(super) fn rate_spot(&self, f: &Body, a: Arg) -> Option<(Spot, bool)> {
+        let moving = f.shape.along?;
+        match a {
+            Arg::Given(value) => Some((self.givens.rate(value, moving)?, false)),
+            Arg::Local(local) => {
+                let i = local.0 as usize;
+                f.moves[i].then(|| (Spot::Place(crossed(f, f.rate_place[i], i)), f.wide[i]))
+            }
+            Arg::Outer(i) => moving.outer.then_some((Spot::Place(Place { array: "e", index: i as usize }), false)),
+            Arg::Guess(_) => None,
+        }
     }
 
     /// The derivative of an operation by the rules of the table, if it moves.

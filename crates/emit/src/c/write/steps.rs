@@ -4,24 +4,25 @@ use halfarrow_compiler::algebra::Function as Elementary;
 use halfarrow_compiler::program::{Arg, ConditionId, ConditionKind, EventTrigger, Method, Op, Step};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{Body, Reading, Writer};
+use super::place::along;
+use super::{Body, Place, Reading, Spot, Writer, crossed};
 use crate::Real;
 use crate::c::derivatives::Expressions;
 use crate::c::header::comment;
 use crate::c::written::{Needed, Series, Variable, Written, needed, written};
 
 impl Writer<'_> {
-    pub(super) fn step(&self, f: &mut Body, step: &Step, place: usize) {
+    pub(super) fn step(&self, f: &mut Body, place: usize) {
+        let step = &f.code.steps[place];
         let (wide, wide_rate) = self.precision(f, step);
-        let mut reads = Reading::default();
-        step.for_each_read(|a| {
-            reads.values.push(self.arg(f, a, wide));
-            reads.rates.push(self.rate(f, a, wide_rate));
-        });
+        let reads = match f.turning {
+            None => self.reading(f, step, (wide, wide_rate)),
+            Some(r) => self.reading_in_turns(f, (r, place), (wide, wide_rate)),
+        };
         match step {
-            Step::Guard { guard, .. } => {
+            Step::Guard { .. } => {
                 let vanishes = self.vanishes(&reads.values, self.precision_of(wide));
-                f.lines.push(self.fail_if(&vanishes, "VANISHED", guard, f.shape.time));
+                f.lines.push(self.fail_if(&vanishes, "VANISHED", &reads.which, f.shape.time));
             }
             Step::Parameter { out, index, default: _ } => {
                 let array = if self.real == Real::Float { "p_exact" } else { "p" };
@@ -34,6 +35,16 @@ impl Writer<'_> {
             },
             Step::Op { out, op } => self.operation(f, (out.0, *op), &reads, place),
         }
+    }
+
+    fn reading(&self, f: &Body, step: &Step, (wide, wide_rate): (bool, bool)) -> Reading {
+        let which = written!("{}", what_fails(step));
+        let mut reads = Reading { which, values: Vec::new(), rates: Vec::new() };
+        step.for_each_read(|a| {
+            reads.values.push(self.arg(f, a, wide));
+            reads.rates.push(self.rate(f, a, wide_rate));
+        });
+        reads
     }
 
     /// Whether a divisor is rounding of what it is the sum of.
@@ -142,22 +153,29 @@ impl Writer<'_> {
 
     /// A value, in double precision or in that of real numbers.
     pub(super) fn arg(&self, f: &Body, a: Arg, wide: bool) -> Written {
-        let (value, is_wide) = match a {
-            Arg::Given(value) if wide => (self.givens.wide_written(value), true),
-            Arg::Given(value) => (self.givens.written(value), self.givens.is_time(value)),
-            Arg::Local(local) => {
-                let i = local.0 as usize;
-                let value = match (f.home[i] == f.chunk, f.wide[i]) {
-                    (true, _) => written!("{}", Variable::Number(Series::Value(local.0))),
-                    (false, true) => written!("m->wide[{}]", f.place[i]),
-                    (false, false) => written!("m->w[{}]", f.place[i]),
-                };
-                (value, f.wide[i])
+        let (spot, is_wide) = self.spot(f, a, wide);
+        let value = match a {
+            Arg::Local(local) if f.is_variable(local.0 as usize) => {
+                written!("{}", f.variables(local.0 as usize)[0])
             }
-            Arg::Outer(i) => (written!("o[{}]", i), false),
-            Arg::Guess(i) => (written!("g[{}]", i), false),
+            _ => spot.written(self.precision_of(is_wide)),
         };
         self.cast(value, is_wide, wide)
+    }
+
+    /// Where a value stands, and whether that is in double precision; of a variable, where it is kept.
+    pub(super) fn spot(&self, f: &Body, a: Arg, wide: bool) -> (Spot, bool) {
+        let place = |array, index: u32| (Spot::Place(Place { array, index: index as usize }), false);
+        match a {
+            Arg::Given(value) if wide => self.givens.wide_spot(value),
+            Arg::Given(value) => (self.givens.spot(value), self.givens.is_time(value)),
+            Arg::Local(local) => {
+                let i = local.0 as usize;
+                (Spot::Place(crossed(f, f.place[i], i)), f.wide[i])
+            }
+            Arg::Outer(i) => place("o", i),
+            Arg::Guess(i) => place("g", i),
+        }
     }
 
     /// Declares what a step computes, and puts it where it is read elsewhere.
@@ -188,19 +206,29 @@ impl Writer<'_> {
         f.constant(variable, written!("    const {} {} = {};{}", kind, variable, value, about), 1);
         if place != usize::MAX {
             let array = if wide { "wide" } else { "w" };
-            f.assign(&format!("m->{array}[{place}]"), &written!("{}", variable));
+            let index = along(f, place);
+            f.assign(&written!("m->{}[{}]", array, index), &written!("{}", variable));
         }
     }
 }
 
+/// The number of what fails if a step does.
+pub(super) fn what_fails(step: &Step) -> usize {
+    match step {
+        Step::Guard { guard, .. } => *guard as usize,
+        Step::Solve(solve) => solve.block.0 as usize,
+        _ => 0,
+    }
+}
+
 /// The angles of which some steps want both sine and cosine.
-pub(super) fn turns(steps: &[Step]) -> FxHashMap<Arg, Option<usize>> {
+pub(super) fn turns<'s>(steps: impl Iterator<Item = &'s Step> + Clone) -> FxHashMap<Arg, Option<usize>> {
     let of = |wanted: Elementary| {
         let angle = move |step: &Step| match step {
             Step::Op { op: Op::Call(f, a), .. } if *f == wanted => Some(*a),
             _ => None,
         };
-        steps.iter().filter_map(angle).collect::<FxHashSet<Arg>>()
+        steps.clone().filter_map(angle).collect::<FxHashSet<Arg>>()
     };
     let cosines = of(Elementary::Cos);
     of(Elementary::Sin).into_iter().filter(|a| cosines.contains(a)).map(|a| (a, None)).collect()

@@ -110,6 +110,7 @@ static void ha_scale_unknowns_at_rest(ha_newton *w)
 {
     const int n = w->n;
     $real *least = w->simplified;
+    $real *size = w->weight;
     int i = 0;
     int e;
     while (i < n && (w->scale[i] != $0.0 || w->correction[i] != $0.0)) {
@@ -118,20 +119,24 @@ static void ha_scale_unknowns_at_rest(ha_newton *w)
     if (i == n) {
         return;
     }
-    $ha_fill(least, $HUGE_VAL, n);
+    for (i = 0; i < n; ++i) {
+        size[i] = $ha_max(w->scale[i], $fabs(w->correction[i]));
+        least[i] = $HUGE_VAL;
+    }
     for (i = 0; i < n; ++i) {
         /* What rests adds nothing. */
         $real others = $0.0;
         for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
-            const int k = w->columns[e];
-            const $real term = $fabs(w->matrix[e]) * $ha_max(w->scale[k], $fabs(w->correction[k]));
+            const $real term = $fabs(w->matrix[e]) * size[w->columns[e]];
             others += term;
         }
-        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
-            const int k = w->columns[e];
-            const $real own = $fabs(w->matrix[e]);
-            if (own > $0.0 && others > $0.0) {
-                least[k] = others / own < least[k] ? others / own : least[k];
+        if (others > $0.0) {
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                const int k = w->columns[e];
+                const $real own = $fabs(w->matrix[e]);
+                if (own > $0.0) {
+                    least[k] = others / own < least[k] ? others / own : least[k];
+                }
             }
         }
     }
