@@ -90,7 +90,7 @@ impl Random {
     /// A law that grows with a variable.
     fn law(&mut self, of: &str) -> String {
         let terms = [
-            format!("{of}"),
+            of.to_string(),
             format!("0.3*{of}^3"),
             format!("0.1*sin({of})"),
             format!("0.2*{of}*cos({of})*cos({of})"),

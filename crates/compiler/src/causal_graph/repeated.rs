@@ -94,17 +94,20 @@ fn repeated(x: &mut Exprs, graph: &BondGraph) -> (BTreeSet<usize>, Vec<ElementId
     (found.into_iter().map(|row| numbers[row]).collect(), idle)
 }
 
+/// Transformers with their moduli.
+type Transformers = Vec<(ElementId, Expr)>;
+
 /// How one thing that moves acts on the constraints of one joint.
 struct Acting {
-    /// By which transformers, with their moduli.
-    own: Vec<(ElementId, Expr)>,
+    /// By which transformers.
+    own: Transformers,
     /// The moduli by which all else acts on the joint.
     all: Vec<Expr>,
 }
 
 /// All that acts through transformers on constraints, joint by joint.
 fn acting(graph: &BondGraph, constraints: &[usize]) -> Vec<Acting> {
-    let mut joints: BTreeMap<&str, BTreeMap<ElementId, Vec<(ElementId, Expr)>>> = BTreeMap::new();
+    let mut joints: BTreeMap<&str, BTreeMap<ElementId, Transformers>> = BTreeMap::new();
     let neighbours = |element: ElementId| {
         let bonds = graph.elements[element].ports.iter().map(|port| &graph.bonds[port.bond]);
         bonds.map(move |bond| if bond.from.element == element { bond.to.element } else { bond.from.element })
@@ -120,7 +123,7 @@ fn acting(graph: &BondGraph, constraints: &[usize]) -> Vec<Acting> {
             }
         }
     }
-    let of_joint = |joint: BTreeMap<ElementId, Vec<(ElementId, Expr)>>| {
+    let of_joint = |joint: BTreeMap<ElementId, Transformers>| {
         let all: Vec<Expr> = joint.values().flatten().map(|own| own.1).collect();
         joint.into_values().map(move |own| Acting { own, all: all.clone() }).collect::<Vec<_>>()
     };

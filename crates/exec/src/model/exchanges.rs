@@ -25,8 +25,8 @@ const ROUNDING: f64 = 1e-12;
 /// Ratios are looked at where what they are divided by has come to less than this part of what it was when they were last.
 const SMALLER: f64 = 0.95;
 /// Which positions follow from others is decided anew where the determinant of their equations has come to a tenth, as a
-/// logarithm to base 2.
-const TURNING: f64 = 3.33;
+/// logarithm.
+const TURNING: f64 = std::f64::consts::LN_10;
 const ITERATIONS: usize = 20;
 
 /// The ratios between variables that could be independent and those that are.

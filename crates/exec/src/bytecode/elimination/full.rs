@@ -3,6 +3,8 @@
 //!
 //! Machine code and exported C do the same operations in the same order.
 
+use halfarrow_compiler::algebra::math;
+
 /// The diagonal stays the pivot while it is at least this fraction of the best one in its column.
 const THRESHOLD: f64 = 0.1;
 
@@ -212,11 +214,11 @@ impl Lu {
         }
     }
 
-    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix.
+    /// The logarithm of the magnitude of the determinant of the factored matrix.
     pub fn log_determinant(&self) -> f64 {
         match self.definite {
-            true => -self.scale.iter().map(|inverse| inverse.abs().log2()).sum::<f64>(),
-            false => (0..self.size).map(|k| self.factors[k * self.size + k].abs().log2()).sum(),
+            true => -self.scale.iter().map(|inverse| math::log(inverse.abs())).sum::<f64>(),
+            false => (0..self.size).map(|k| math::log(self.factors[k * self.size + k].abs())).sum(),
         }
     }
 

@@ -78,7 +78,7 @@ impl Factors {
         }
     }
 
-    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix; NaN where it is not known.
+    /// The logarithm of the magnitude of the determinant of the factored matrix; NaN where it is not known.
     pub fn log_determinant(&self) -> f64 {
         match self {
             Factors::Full(lu, _) => lu.log_determinant(),

@@ -8,6 +8,7 @@
 use super::definite::SparseDefinite;
 use super::exchanged::Exchanged;
 use super::full::Lu;
+use halfarrow_compiler::algebra::math;
 use halfarrow_compiler::sparse::SymbolicFactors;
 use std::sync::Arc;
 
@@ -148,12 +149,12 @@ impl SparseLu {
         lu.factor()
     }
 
-    /// The logarithm, to base 2, of the magnitude of the determinant of the factored matrix; NaN where rows have been exchanged
+    /// The logarithm of the magnitude of the determinant of the factored matrix; NaN where rows have been exchanged
     /// or the matrix is definite, whose pivots are not looked at.
     pub fn log_determinant(&self) -> f64 {
         match self.factored {
             Factored::Full => self.full.as_ref().map_or(f64::NAN, |lu| lu.log_determinant()),
-            Factored::Sparse => -self.inverse.iter().map(|inverse| inverse.abs().log2()).sum::<f64>(),
+            Factored::Sparse => -self.inverse.iter().map(|inverse| math::log(inverse.abs())).sum::<f64>(),
             Factored::Definite | Factored::Exchanged => f64::NAN,
         }
     }

@@ -182,8 +182,9 @@ impl Newton {
         self.previous.copy_from_slice(&self.x);
         self.previous_outer.copy_from_slice(&self.outer);
         self.previous_jacobian.copy_from_slice(&self.jacobian);
-        // Where the block reads the same, it goes on from itself.
-        (self.following, self.settled, self.short) = (true, self.fresh, true);
+        // Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more.
+        let settled = self.fresh && !self.positions;
+        (self.following, self.settled, self.fresh, self.short) = (true, settled, settled, true);
     }
 
     /// The state, to be restored.

@@ -200,7 +200,10 @@ static void ha_newton_accept(ha_model *m, int number)
     m->fresh[number] = 0;
     m->settled[number] = 0;
 //else
-    /* Where the block reads the same, it goes on from itself. */
+    /* Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more. */
+//if sought_positions
+    m->fresh[number] = m->fresh[number] && !w.block->position;
+//end
     m->settled[number] = m->fresh[number];
 //end
     m->following[number] = 1;
