@@ -207,11 +207,12 @@ impl Program {
         blocks.iter().flat_map(|&id| of_block(id)).collect()
     }
 
-    /// The unknowns of some blocks, of those that anything reads, in the order of [`Program::values`].
+    /// An unknown of each of some blocks, of those that anything reads, in the order of [`Program::values`]: where these are
+    /// computed the blocks are solved.
     pub fn unknowns_of(&self, blocks: &[BlockId]) -> Vec<Value> {
-        let blocks: FxHashSet<BlockId> = blocks.iter().copied().collect();
-        let is_unknown = |op: Op| if let Op::Solution(block, _) = op { blocks.contains(&block) } else { false };
-        self.values.iter().filter(|(_, op)| is_unknown(*op)).map(|(value, _)| value).collect()
+        let mut left: FxHashSet<BlockId> = blocks.iter().copied().collect();
+        let mut is_first = |op: Op| if let Op::Solution(block, _) = op { left.remove(&block) } else { false };
+        self.values.iter().filter(|(_, op)| is_first(*op)).map(|(value, _)| value).collect()
     }
 
     /// The routine that computes the wanted values, in the order of [`Program::values`].
