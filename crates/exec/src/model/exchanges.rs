@@ -106,9 +106,6 @@ impl Model {
     /// which ones do is decided anew at `(t, x)`.
     fn exchange_positions(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
         let code = self.code.clone();
-        if code.program.positions.is_empty() || !self.compiled.has_alternatives() {
-            return Ok(false);
-        }
         let independent = code.exchanges.iter().flat_map(|ratios| ratios.independent.iter().map(|e| e.symbol));
         // What is looked at on the way may lead the next solutions elsewhere.
         let (before, at) = (self.clone(), x.to_vec());
