@@ -34,7 +34,7 @@ impl Exprs {
         if let Some(&known) = self.derivatives.get(&(e, by)) {
             return known;
         }
-        let order = self.below(&[e], &|e| self.depends_on(e, symbol) && !self.derivatives.contains_key(&(e, by)));
+        let order = self.reading_below(&[e], &|s| s == symbol, &|e| self.derivatives.contains_key(&(e, by)));
         for part in order {
             let slope = self.derivative_of_node(part, by);
             self.derivatives.insert((part, by), slope);
@@ -45,7 +45,7 @@ impl Exprs {
     /// The parts of an expression whose derivative by time is not known yet, those within others first; what keeps its
     /// value is left out, as `varies` tells of symbols.
     pub fn undifferentiated(&self, e: Expr, varies: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
-        self.below(&[e], &|part| !self.derivatives.contains_key(&(part, By::Time)) && self.depends_on_any(part, varies))
+        self.reading_below(&[e], varies, &|part| self.known_rate(part).is_some())
     }
 
     /// The derivative of a part by time, from those of the parts that it is made of, as far as [`set_rate`](Exprs::set_rate)
@@ -81,7 +81,7 @@ impl Exprs {
 
     /// The expressions with expressions in place of symbols, all at once; what they share is rebuilt once.
     pub fn substitute_all(&mut self, roots: &[Expr], values: &BTreeMap<Symbol, Expr>) -> Vec<Expr> {
-        let order = self.below(roots, &|e| self.depends_on_any(e, &|s| values.contains_key(&s)));
+        let order = self.reading_below(roots, &|s| values.contains_key(&s), &|_| false);
         let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
         for part in order {
             let rebuilt = match self.node(part) {

@@ -23,7 +23,7 @@ impl Exprs {
     /// As `linear_in`, with the coefficients that are not zero by the index of their symbol.
     pub fn sparse_linear_in(&mut self, e: Expr, symbols: &[Symbol]) -> Option<(BTreeMap<usize, Expr>, Expr)> {
         let index: FxHashMap<Symbol, usize> = symbols.iter().enumerate().map(|(i, &s)| (s, i)).collect();
-        let order = self.below(&[e], &|e| self.depends_on_any(e, &|s| index.contains_key(&s)));
+        let order = self.reading_below(&[e], &|s| index.contains_key(&s), &|_| false);
         let mut forms: FxHashMap<Expr, Form> = FxHashMap::default();
         for part in order {
             let form = self.form_of_node(part, &index, &forms);

@@ -243,6 +243,32 @@ impl Exprs {
         self.seen_below(roots, keep, &|_| true).into_order().into_vec()
     }
 
+    /// The entries below the given ones that read a symbol for which `wanted` holds, parts before wholes; those that are
+    /// known, and what stands below them alone, are left out. Asking each entry by itself would walk through the same long
+    /// expressions again and again.
+    pub(super) fn reading_below(
+        &self,
+        roots: &[Expr],
+        wanted: &dyn Fn(Symbol) -> bool,
+        is_known: &dyn Fn(Expr) -> bool,
+    ) -> Vec<Expr> {
+        let small = |e: Expr| self.sets.get(self.entry(e).symbols);
+        let may_read = |e: Expr| small(e).is_none_or(|small| small.iter().any(|&s| wanted(s)));
+        let mut reading: FxHashSet<Expr> = FxHashSet::default();
+        let mut order = self.below(roots, &|e| may_read(e) && !is_known(e));
+        order.retain(|&e| {
+            let mut reads = small(e).is_some();
+            if !reads {
+                self.node(e).for_each_child(|c| reads |= reading.contains(&c) || is_known(c));
+            }
+            if reads {
+                reading.insert(e);
+            }
+            reads
+        });
+        order
+    }
+
     fn seen_below(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool, opens: &dyn Fn(&Node) -> bool) -> Seen {
         let mut seen = Seen::default();
         let mut open: SmallVec<[Expr; FEW]> = SmallVec::new();
