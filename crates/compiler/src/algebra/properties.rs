@@ -92,6 +92,13 @@ impl Exprs {
         self.entry(e).properties.piecewise
     }
 
+    /// The parts of an expression that have a corner or a jump of their own: where one stands within another, both.
+    pub fn corners(&self, e: Expr) -> Vec<Expr> {
+        let mut found = self.below(&[e], &|part| self.is_piecewise(part));
+        found.retain(|&part| is_piecewise(self.node(part)));
+        found
+    }
+
     /// The same as [`nonzero`](Self::nonzero), to choose by: nothing is decided by it yet.
     pub fn is_known_nonzero(&self, e: Expr) -> bool {
         self.signs(e).within(Signs::NOT_ZERO)

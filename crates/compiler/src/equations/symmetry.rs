@@ -8,9 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::points::{POINTS, ROUNDING, solved, somewhere};
+use super::points::{POINTS, ROUNDING, solved, somewhere, value};
 use super::{EquationStep, LinearBlock};
-use crate::algebra::{Evaluator, Expr, Exprs, Node, Symbol};
+use crate::algebra::{Expr, Exprs, Node, Symbol};
 
 /// An entry of a matrix: row, column.
 type Place = (usize, usize);
@@ -56,11 +56,11 @@ fn signs(x: &Exprs, pairs: &[(Place, Expr, Expr)], named: &[(Symbol, Expr)], ste
     let roots: Vec<Expr> = pairs.iter().flat_map(|p| [p.1, p.2]).collect();
     let order = before(x, &roots, named, steps);
     for point in 0..POINTS {
-        let known = values(x, point, named, steps, &order);
-        let mut at = |s: Symbol| known.get(&s).copied().unwrap_or_else(|| somewhere(point, s));
-        let mut values = Evaluator::new(x, &mut at);
+        let known = values(x, point, &|s| somewhere(point, s), named, steps, &order);
+        let at = |s: Symbol| known.get(&s).copied().unwrap_or_else(|| somewhere(point, s));
+        let mut parts = FxHashMap::default();
         for (pair, sign) in pairs.iter().zip(&mut signs) {
-            let (upper, lower) = (values.value(pair.1), values.value(pair.2));
+            let [upper, lower] = [pair.1, pair.2].map(|e| value(x, point, e, &at, &mut parts));
             let equal = |a: f64, b: f64| (a - b).abs() <= ROUNDING * (a.abs() + b.abs());
             let here = if equal(upper, lower) {
                 1
@@ -110,10 +110,11 @@ fn before(x: &Exprs, roots: &[Expr], named: &[(Symbol, Expr)], steps: &[Equation
     found.into_iter().collect()
 }
 
-/// The values of all variables that these steps define, and of the names, at a point.
+/// The values of all variables that these steps define, and of the names, where other variables have these values.
 fn values(
     x: &Exprs,
     point: usize,
+    at: &dyn Fn(Symbol) -> f64,
     named: &[(Symbol, Expr)],
     steps: &[EquationStep],
     order: &[usize],
@@ -121,11 +122,7 @@ fn values(
     let mut known: FxHashMap<Symbol, f64> = FxHashMap::default();
     let mut parts: FxHashMap<Expr, f64> = FxHashMap::default();
     let mut evaluate = |e: Expr, known: &FxHashMap<Symbol, f64>| {
-        let mut at = |s: Symbol| known.get(&s).copied().unwrap_or_else(|| somewhere(point, s));
-        let mut values = Evaluator::knowing(x, &mut at, std::mem::take(&mut parts));
-        let value = values.value(e);
-        parts = values.into_known();
-        value
+        value(x, point, e, &|s| known.get(&s).copied().unwrap_or_else(|| at(s)), &mut parts)
     };
     for &k in order {
         match &steps[k] {
@@ -148,6 +145,18 @@ fn values(
         known.insert(symbol, value);
     }
     known
+}
+
+/// The values of all variables on which these expressions rest and which steps define, where others have these values.
+pub(super) fn values_of_steps(
+    x: &Exprs,
+    point: usize,
+    at: &dyn Fn(Symbol) -> f64,
+    roots: &[Expr],
+    steps: &[EquationStep],
+) -> FxHashMap<Symbol, f64> {
+    let order = before(x, roots, &[], steps);
+    values(x, point, at, &[], steps, &order)
 }
 
 /// What is evaluated anyway.
