@@ -27,9 +27,32 @@ const FAMILIES: [Growing; 6] = [
     Growing { family: Family::FourBars, sizes: [5, 20, 80], cells: LINE, most: 1.1 },
 ];
 
-fn operations(family: Family, size: usize) -> usize {
-    let model = Model::from_text("growing.bond", &family.model("Growing", size), &[]).expect("a model");
+/// Bodies on hinges across each other, one hung from the other, which move in space.
+const HINGES: &str = r#"model Hinges
+import std.multibody
+World:ground()
+for i in 1..SIZE {
+    Revolute:hinge[i](n = if mod(i, 2) == 1 then [0, 1, 0] else [1, 0, 0], q0 = 0.1, fixed = 1)
+    hinge[i] -> 1[frame]:link[i]
+    link[i] -> Body:body[i](m = 1, J = diag([0.02, 0.02, 0.01]), c = [0, 0, -0.25])
+    if i == 1 {
+        ground -> hinge[i]
+    } else {
+        link[i - 1] -> FixedTranslation:arm[i](d = [0, 0, -0.5]) -> hinge[i]
+    }
+}
+"#;
+/// How the operations of the largest two chains of hinges may grow.
+const HINGES_GROW: f64 = 1.06;
+
+fn operations(text: &str) -> usize {
+    let model = Model::from_text("growing.bond", text, &[]).expect("a model");
     model.compile(Form::Minimal).expect("equations").operations()
+}
+
+/// The power with which the last of these counts grow with the cells.
+fn exponent([_, middle, large]: [usize; 3], [_, fewer, more]: [usize; 3]) -> f64 {
+    libm::log(large as f64 / middle as f64) / libm::log(more as f64 / fewer as f64)
 }
 
 /// Golden counts; `UPDATE=1` writes them anew.
@@ -37,15 +60,20 @@ fn operations(family: Family, size: usize) -> usize {
 fn work_grows_with_the_cells() {
     let mut table = String::new();
     for Growing { family, sizes, cells, most } in FAMILIES {
-        let counted = sizes.map(|size| operations(family, size));
+        let counted = sizes.map(|size| operations(&family.model("Growing", size)));
         for (size, count) in sizes.iter().zip(counted) {
             _ = writeln!(table, "{} {size}: {count}", family.name());
         }
-        let [_, middle, large] = counted.map(|count| count as f64);
-        let [_, fewer, more] = sizes.map(|size| cells(size) as f64);
-        let exponent = libm::log(large / middle) / libm::log(more / fewer);
+        let exponent = exponent(counted, sizes.map(cells));
         assert!(exponent <= most, "{} grows as the power {exponent:.3} of its cells", family.name());
     }
+    let sizes = [10, 40, 80];
+    let counted = sizes.map(|size| operations(&HINGES.replace("SIZE", &size.to_string())));
+    for (size, count) in sizes.iter().zip(counted) {
+        _ = writeln!(table, "hinges {size}: {count}");
+    }
+    let exponent = exponent(counted, sizes);
+    assert!(exponent <= HINGES_GROW, "hinges grow as the power {exponent:.3} of their number");
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/growth.txt");
     if std::env::var_os("UPDATE").is_some() {
         std::fs::write(&golden, &table).expect("written");

@@ -4,18 +4,19 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use petgraph::algo::TarjanScc;
 use petgraph::graph::DiGraph;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
+use super::recursion::{Eliminated, Recursion, recursion};
 use super::supports::Supports;
 use super::symmetry::mirrored;
 use super::{EquationStep, LinearBlock, NewtonBlock};
 use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
-use crate::sparse::SparseMatrix;
+use crate::sparse::{Pattern, SparseMatrix, SymbolicFactors, full_operations};
 
 /// Terms that may be formed in the search for short forms of the entries of a matrix.
 const WORK: u64 = 1_000_000;
@@ -23,9 +24,14 @@ const WORK: u64 = 1_000_000;
 const LONGEST: u64 = 600;
 
 /// Loops with at most so many unknowns are left as they are torn.
-const FEW: usize = 32;
+pub(super) const FEW: usize = 32;
 /// What is tried for the number of unknowns that a variable may read in a larger loop.
 const LONGEST_ROWS: [usize; 5] = [usize::MAX, 16, 8, 4, 2];
+
+/// A loop is gone through from its leaves where that takes less than this part of the operations: a matrix is read more easily,
+const MUCH_FEWER: f64 = 0.75;
+/// and of a loop with more unknowns than [`FEW`] where it takes less than this part.
+const FEWER: f64 = 0.9;
 
 /// Matrices of so many rates are looked at for entries that mirror each other.
 const MIRRORED: usize = 4;
@@ -163,9 +169,13 @@ fn block(
             Definition::Implicit(e) => e,
         });
     }
-    let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     // A matrix that closes positions may be singular anywhere, and the start is to find its own way around that.
     let positions = torn.iter().any(|s| d.computed.contains(s));
+    let of_rates = torn.iter().all(|s| first.contains(s));
+    let inward =
+        if of_rates && torn.len() >= MIRRORED { recursion(d, &torn, &body, &residuals, &ordered.steps) } else { None };
+    let whole = torn.clone();
+    let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
     let Some((named, mut rows)) = forms else {
         let inner = body.clone();
@@ -173,21 +183,42 @@ fn block(
         ordered.assign(body);
         return Ok(());
     };
-    if (MIRRORED..=FEW).contains(&torn.len()) && torn.iter().all(|s| first.contains(s)) {
+    let enough = if whole.len() <= FEW { MUCH_FEWER } else { FEWER };
+    if let Some(inward) = inward
+        && inward.operations(&d.x) < enough * operations(&d.x, &named, &rows, &[])
+    {
+        return recursive(d, &whole, inward, (&symbols, first), ordered);
+    }
+    if of_rates && (MIRRORED..=FEW).contains(&torn.len()) {
         mirrored(&mut d.x, &mut rows, &named, &ordered.steps);
     }
     ordered.named.extend(&named);
     ordered.assign(named);
+    solve_rows(d, torn, rows, &symbols, ordered)?;
+    ordered.assign(body);
+    Ok(())
+}
+
+/// Steps that solve linear equations, coefficients by the places of their unknowns and the rest. `members`: all variables of
+/// the loop.
+fn solve_rows(
+    d: &mut Definitions,
+    unknowns: Vec<Symbol>,
+    rows: Vec<Row>,
+    members: &[Symbol],
+    ordered: &mut Ordered,
+) -> Result<(), Insoluble> {
+    let elements = elements_of(d, members);
     let x = &mut d.x;
     let (matrix, right) = shortened(x, rows);
     if is_singular(x, &matrix) {
-        return Err(Insoluble { unknowns: torn, members: symbols, elements });
+        return Err(Insoluble { unknowns, members: members.to_vec(), elements });
     }
     for (row, &right) in matrix.rows().zip(&right) {
-        let left = row.map(|(k, &e)| (torn[k], e)).collect();
+        let left = row.map(|(k, &e)| (unknowns[k], e)).collect();
         ordered.rows.push(LinearRow { left, right });
     }
-    match (matrix.entries(), &right[..], &torn[..]) {
+    match (matrix.entries(), &right[..], &unknowns[..]) {
         (&[pivot], [right], [unknown]) => {
             if !x.nonzero(pivot) {
                 ordered.steps.push(EquationStep::Guard { pivot, elements });
@@ -196,9 +227,58 @@ fn block(
             let value = x.div(*right, pivot);
             ordered.steps.push(EquationStep::Assign { symbol: *unknown, value });
         }
-        _ => ordered.steps.push(LinearBlock { unknowns: torn, matrix, right, elements }.into()),
+        _ => ordered.steps.push(LinearBlock { unknowns, matrix, right, elements }.into()),
     }
-    ordered.assign(body);
+    Ok(())
+}
+
+/// Operations to evaluate these rows of a symmetric loop and to solve them, with all that they and `others` need.
+pub(super) fn operations(x: &Exprs, named: &[(Symbol, Expr)], rows: &[Row], others: &[Expr]) -> f64 {
+    let mut roots = others.to_vec();
+    rows.iter().for_each(|(row, rest)| roots.extend(row.iter().map(|e| e.1).chain([*rest])));
+    let values: FxHashMap<Symbol, Expr> = named.iter().copied().collect();
+    let mut seen: FxHashSet<Symbol> = FxHashSet::default();
+    let mut open = roots.clone();
+    while let Some(e) = open.pop() {
+        let new = x.symbols_of(e).into_iter().filter(|&s| seen.insert(s)).filter_map(|s| values.get(&s));
+        let before = roots.len();
+        roots.extend(new);
+        open.extend_from_slice(&roots[before..]);
+    }
+    let pattern = Pattern::new(rows.iter().map(|row| row.0.iter().map(|e| e.0)));
+    let solved = SymbolicFactors::of_large(&pattern).map_or(full_operations(pattern.size()), |f| f.operations());
+    x.cost(&roots).total() as f64 + solved as f64 / 2.0
+}
+
+/// Steps of a loop that is gone through from its leaves.
+fn recursive(
+    d: &mut Definitions,
+    torn: &[Symbol],
+    found: Recursion,
+    (members, first): (&[Symbol], &BTreeSet<Symbol>),
+    ordered: &mut Ordered,
+) -> Result<(), Insoluble> {
+    let Recursion { named, left, mut rows, eliminated, after } = found;
+    let unknowns: Vec<Symbol> = left.iter().map(|&k| torn[k]).collect();
+    if (MIRRORED..=FEW).contains(&unknowns.len()) {
+        mirrored(&mut d.x, &mut rows, &named, &ordered.steps);
+    }
+    ordered.named.extend(&named);
+    ordered.assign(named);
+    for Eliminated { unknown, pivot, right } in eliminated {
+        if !d.x.nonzero(pivot) {
+            let elements = elements_of(d, &[d.x.undotted(unknown).0]);
+            ordered.steps.push(EquationStep::Guard { pivot, elements });
+            d.x.assume_nonzero(pivot);
+        }
+        ordered.rows.push(LinearRow { left: vec![(unknown, pivot)], right });
+    }
+    if !unknowns.is_empty() {
+        solve_rows(d, unknowns, rows, members, ordered)?;
+    }
+    // Motions further in stand in the equations of many rates.
+    ordered.named.extend(after.iter().filter(|v| !first.contains(&v.0)));
+    ordered.assign(after);
     Ok(())
 }
 
@@ -229,7 +309,7 @@ fn kept_sparse(x: &mut Exprs, torn: Vec<Symbol>, body: Vec<(Symbol, Expr)>, resi
 /// Names for parts, each with its value.
 type Named = Vec<(Symbol, Expr)>;
 /// The coefficients of unknowns that are not 0, and the rest.
-type Row = (Vec<(usize, Expr)>, Expr);
+pub(super) type Row = (Vec<(usize, Expr)>, Expr);
 
 /// The residuals of a loop as linear forms in its unknowns, coefficients and rest, with names for parts of them; `None` if
 /// they are none, be it that terms which are no linear forms cancel.

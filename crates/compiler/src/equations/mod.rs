@@ -23,6 +23,8 @@ mod observed;
 mod points;
 mod position_relations;
 mod positions;
+mod recognition;
+mod recursion;
 mod relations;
 mod rows;
 mod stiff;

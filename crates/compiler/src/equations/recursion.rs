@@ -1,0 +1,538 @@
+//! Linear loops of many rates, gone through from the leaves of a mechanism to its base.
+//!
+//! Written down to the rates, a tree of bodies makes a full matrix. Here variables are put into each other from the outside
+//! in, each motion together with what acts along it, so that what is known of a part of the machine is its inertia, seen from
+//! where it hangs. A rate is eliminated as soon as few variables cut it off from the rest: on a chain of bodies these are the
+//! motions of the joint before, and what comes about is the recursion of articulated bodies (R. Featherstone, Rigid Body
+//! Dynamics Algorithms, 2008, chapter 7), with operations in proportion to its length.
+//!
+//! Each pivot is one of the matrix of all rates, eliminated in some order. Of a symmetric definite matrix none vanishes,
+//! whatever the order; only where the matrix is found to be one is a rate eliminated.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rustc_hash::FxHashMap;
+
+use super::EquationStep;
+use super::blocks::{FEW, Row, operations};
+use super::definitions::Definitions;
+use super::points::ROUNDING;
+use super::recognition::{Parameters, Point, Recognition};
+use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind, ZERO};
+use crate::bond_graph::Meaning;
+
+/// What is written longer than this keeps a name.
+const NAMED: u64 = 3;
+/// Loops with more unknowns are not looked at: which variables lie between an unknown and its equation is found out for
+/// each, at a cost that grows with their number.
+const MOST: usize = 1000;
+/// A part of a machine is cut off by few variables where these are no more: six motions of a body in space, and some of the
+/// joints beside.
+const SHORT: usize = 9;
+/// Variables of bonds that are others by name alone are followed so far.
+const ALIASES: usize = 100;
+/// Products that may be formed for each variable of a loop: where it takes more, variables are not few at any cut.
+const WORK: usize = 60;
+
+/// A loop solved in this way.
+pub struct Recursion {
+    /// Names for parts, each with its value, in what is defined before the loop and in names before it.
+    pub named: Vec<(Symbol, Expr)>,
+    /// The unknowns that are left, by their place among all, with the equations between them.
+    pub left: Vec<usize>,
+    /// Coefficients by the place of their unknown among those left, and the rest.
+    pub rows: Vec<Row>,
+    /// Unknowns that were eliminated.
+    pub eliminated: Vec<Eliminated>,
+    /// Values of eliminated unknowns and of the other variables of the loop, in order of evaluation.
+    pub after: Vec<(Symbol, Expr)>,
+}
+
+impl Recursion {
+    /// Operations to find all unknowns.
+    pub fn operations(&self, x: &Exprs) -> f64 {
+        let others: Vec<Expr> = self.eliminated.iter().flat_map(|e| [e.pivot, e.right]).collect();
+        operations(x, &self.named, &self.rows, &others)
+    }
+}
+
+/// An unknown that was eliminated: `pivot · unknown = right`, in variables that are known before it.
+#[derive(Debug, Clone, Copy)]
+pub struct Eliminated {
+    /// The unknown.
+    pub unknown: Symbol,
+    /// What multiplies it.
+    pub pivot: Expr,
+    /// The right side.
+    pub right: Expr,
+}
+
+/// A linear form in variables of the loop, by their numbers.
+#[derive(Debug, Clone)]
+struct Form {
+    terms: BTreeMap<usize, Expr>,
+    rest: Expr,
+}
+
+impl Form {
+    /// An expression as a form in the variables of the loop; `None` if it is none.
+    fn of(x: &mut Exprs, e: Expr, index: &FxHashMap<Symbol, usize>) -> Option<Form> {
+        let read: Vec<Symbol> = x.symbols_of(e).into_iter().filter(|s| index.contains_key(s)).collect();
+        let (own, rest) = x.sparse_linear_in(e, &read)?;
+        Some(Form { terms: own.into_iter().map(|(k, e)| (index[&read[k]], e)).collect(), rest })
+    }
+}
+
+/// Where an unknown is eliminated.
+#[derive(Debug, Clone, Copy)]
+enum Cut {
+    /// Where few variables cut it off from the rest of its loop.
+    Short,
+    /// Where these are fewer than the unknowns further in: of short chains a matrix takes less.
+    ShorterThanRates,
+}
+
+/// The recursion of a loop with these unknowns, definitions of its other variables in order and residuals; `None` if it is
+/// not linear or takes too much. `steps`: what is evaluated before.
+pub fn recursion(
+    d: &mut Definitions,
+    unknowns: &[Symbol],
+    body: &[(Symbol, Expr)],
+    residuals: &[Expr],
+    steps: &[EquationStep],
+) -> Option<Recursion> {
+    if unknowns.len() > MOST {
+        return None;
+    }
+    let short = with_cuts(Cut::Short, d, (unknowns, body, residuals), steps);
+    if unknowns.len() > FEW {
+        return short;
+    }
+    let other = with_cuts(Cut::ShorterThanRates, d, (unknowns, body, residuals), steps);
+    short.into_iter().chain(other).min_by(|a, b| a.operations(&d.x).total_cmp(&b.operations(&d.x)))
+}
+
+/// Unknowns of a loop, definitions of its other variables in order, and residuals.
+type Loop<'a> = (&'a [Symbol], &'a [(Symbol, Expr)], &'a [Expr]);
+
+/// The same with unknowns eliminated in these places.
+fn with_cuts(
+    cut: Cut,
+    d: &mut Definitions,
+    (unknowns, body, residuals): Loop,
+    steps: &[EquationStep],
+) -> Option<Recursion> {
+    let symbols: Vec<Symbol> = unknowns.iter().copied().chain(body.iter().map(|b| b.0)).collect();
+    let index: FxHashMap<Symbol, usize> = symbols.iter().enumerate().map(|(k, &s)| (s, k)).collect();
+    let duals = symbols.iter().map(|&s| dual(d, s).and_then(|s| index.get(&s).copied())).collect();
+    let x = &mut d.x;
+    let roots: Vec<Expr> = residuals.iter().copied().chain(body.iter().map(|b| b.1)).collect();
+    let forms = roots.iter().map(|&e| Form::of(x, e, &index)).collect::<Option<Vec<Form>>>()?;
+    let mut readers = vec![BTreeSet::new(); symbols.len()];
+    for (row, form) in forms.iter().enumerate() {
+        form.terms.keys().for_each(|&k| _ = readers[k].insert(row));
+    }
+    let (gone, rests) = (vec![false; symbols.len()], vec![ZERO; symbols.len()]);
+    let recognition = Recognition::new(x, &roots, steps);
+    let mut open = Open {
+        x,
+        symbols,
+        unknowns: unknowns.len(),
+        forms,
+        readers,
+        rests,
+        gone,
+        recognition,
+        eliminated: Vec::new(),
+        work: 0,
+    };
+    let order = open.levels(duals);
+    let definite = open.is_definite(&roots, steps);
+    if !definite && unknowns.len() > FEW {
+        return None;
+    }
+    open.put_in_what_rests();
+    if definite {
+        open.eliminate(&order, cut)?;
+    }
+    let all = (open.unknowns..open.symbols.len()).collect();
+    open.put_in_all(all, &order)?;
+    open.finish(body)
+}
+
+/// The rate that makes a power with a variable of a bond: that of its other variable.
+fn dual(d: &Definitions, symbol: Symbol) -> Option<Symbol> {
+    let mut other = match d.meaning(d.x.untwinned(symbol))? {
+        Meaning::Effort(bond) => d.graph.bonds[bond].flow,
+        Meaning::Flow(bond) => d.graph.bonds[bond].effort,
+        _ => return None,
+    };
+    for _ in 0..ALIASES {
+        if let Some(rate) = d.x.find_made_of(SymbolKind::Rate(other)).filter(|rate| d.of.contains_key(rate)) {
+            return Some(rate);
+        }
+        let &Node::Symbol(next) = d.x.node(d.of.get(&other)?.expr()) else { return None };
+        other = next;
+    }
+    None
+}
+
+/// A loop whose variables are put into each other.
+struct Open<'a> {
+    x: &'a mut Exprs,
+    symbols: Vec<Symbol>,
+    /// How many of them are unknowns of the loop; the others have definitions.
+    unknowns: usize,
+    /// Residuals of unknowns, definitions of the others.
+    forms: Vec<Form>,
+    /// The forms that read a variable.
+    readers: Vec<BTreeSet<usize>>,
+    /// What they are where all unknowns vanish.
+    rests: Vec<Expr>,
+    /// Variables that were put in.
+    gone: Vec<bool>,
+    recognition: Recognition,
+    eliminated: Vec<Eliminated>,
+    /// Products formed so far.
+    work: usize,
+}
+
+impl Open<'_> {
+    /// How far in a variable stands, by the longest way from a motion to the equations; what acts along a motion is put in
+    /// just before it.
+    fn levels(&self, duals: Vec<Option<usize>>) -> Vec<usize> {
+        let n = self.symbols.len();
+        let (mut from, mut to) = (vec![0; n], vec![0; n]);
+        let next = |known: &[usize], j: usize| if j < self.unknowns { 0 } else { known[j] };
+        for k in self.unknowns..n {
+            from[k] = 1 + self.forms[k].terms.keys().map(|&j| next(&from, j)).max().unwrap_or(0);
+        }
+        for k in (self.unknowns..n).rev() {
+            to[k] = 1 + self.readers[k].iter().map(|&j| next(&to, j)).max().unwrap_or(0);
+        }
+        let level = |k: usize| match duals[k] {
+            Some(dual) if dual >= self.unknowns => 2 * to[dual],
+            Some(_) => 2 * from[k] + 1,
+            None => 2 * from[k].max(to[k]) + 1,
+        };
+        (0..n).map(level).collect()
+    }
+
+    /// Whether the matrix of the unknowns is symmetric, and definite at the given parameters. Rows may have either sign.
+    fn is_definite(&self, roots: &[Expr], steps: &[EquationStep]) -> bool {
+        [(0, Parameters::Any), (1, Parameters::Given), (2, Parameters::Given)].into_iter().all(
+            |(number, parameters)| {
+                let mut point = Point::new(self.x, number, parameters, roots, steps);
+                let mut matrix = self.matrix(&mut point);
+                let n = self.unknowns;
+                let sizes: Vec<f64> = (0..n).map(|k| matrix[k * n + k]).collect();
+                for (k, size) in sizes.iter().enumerate() {
+                    (0..n).for_each(|j| matrix[k * n + j] *= size.signum());
+                }
+                is_symmetric(n, &matrix) && (parameters == Parameters::Any || has_positive_pivots(n, matrix))
+            },
+        )
+    }
+
+    /// What the residuals make of the unknowns, at a point.
+    fn matrix(&self, point: &mut Point) -> Vec<f64> {
+        let n = self.unknowns;
+        let value = |(&j, &e): (&usize, &Expr), point: &mut Point| (j, point.value(self.x, e));
+        let coefficients: Vec<Vec<(usize, f64)>> =
+            self.forms.iter().map(|form| form.terms.iter().map(|term| value(term, point)).collect()).collect();
+        let mut matrix = vec![0.0; n * n];
+        let mut values = vec![0.0; self.symbols.len()];
+        for column in 0..n {
+            values.fill(0.0);
+            values[column] = 1.0;
+            let sum = |values: &[f64], k: usize| coefficients[k].iter().map(|&(j, e)| e * values[j]).sum::<f64>();
+            for k in n..self.symbols.len() {
+                values[k] = sum(&values, k);
+            }
+            (0..n).for_each(|row| matrix[row * n + column] = sum(&values, row));
+        }
+        matrix
+    }
+
+    /// What variables are where all unknowns vanish is put into the residuals; their forms are without a rest then.
+    fn put_in_what_rests(&mut self) {
+        let n = self.symbols.len();
+        for k in (self.unknowns..n).chain(0..self.unknowns) {
+            let form = &self.forms[k];
+            let mut sum = vec![form.rest];
+            for (&j, &e) in &form.terms {
+                sum.push(self.x.mul(&[e, self.rests[j]]));
+            }
+            let sum = self.x.add(&sum);
+            let sum = if self.recognition.is_zero(self.x, sum) { ZERO } else { sum };
+            if k < self.unknowns {
+                self.forms[k].rest = sum;
+            } else {
+                let own = self.symbols[k];
+                self.rests[k] = self.recognition.short(self.x, sum, NAMED, |x| x.bias(own));
+                self.forms[k].rest = ZERO;
+            }
+        }
+    }
+
+    /// Eliminates unknowns where the rest of the loop is cut off, those furthest out first.
+    fn eliminate(&mut self, order: &[usize], cut: Cut) -> Option<()> {
+        let mut unknowns: Vec<(usize, usize)> = (0..self.unknowns).map(|k| (self.between(k).len(), k)).collect();
+        unknowns.sort_unstable();
+        for (_, k) in unknowns {
+            let between = self.between(k);
+            let boundary = self.boundary(k, &between);
+            let is_cut = match cut {
+                Cut::Short => boundary <= SHORT,
+                Cut::ShorterThanRates => boundary < self.further_in(k, boundary),
+            };
+            if !is_cut || !self.is_read(k) {
+                continue;
+            }
+            self.put_in_all(between, order)?;
+            self.solve(k)?;
+            self.put_in(k);
+        }
+        Some(())
+    }
+
+    /// Whether variables with definitions are left that read an unknown.
+    fn is_read(&self, k: usize) -> bool {
+        self.readers[k].iter().any(|&j| j >= self.unknowns)
+    }
+
+    /// The variables through which the residual of an unknown reads the unknown.
+    fn between(&self, k: usize) -> BTreeSet<usize> {
+        let read = self.reached(k, &|j| self.forms[j].terms.keys().copied().collect());
+        let reading = self.reached(k, &|j| self.readers[j].iter().copied().collect());
+        (self.unknowns..self.symbols.len()).filter(|&j| read[j] && reading[j]).collect()
+    }
+
+    /// The variables with definitions that are reached from an unknown.
+    fn reached(&self, k: usize, next: &dyn Fn(usize) -> Vec<usize>) -> Vec<bool> {
+        let mut seen = vec![false; self.symbols.len()];
+        let mut open = vec![k];
+        while let Some(j) = open.pop() {
+            for next in next(j) {
+                if next >= self.unknowns && !std::mem::replace(&mut seen[next], true) {
+                    open.push(next);
+                }
+            }
+        }
+        seen
+    }
+
+    /// How many other variables the residual of an unknown reads through these.
+    fn boundary(&self, k: usize, between: &BTreeSet<usize>) -> usize {
+        let forms = between.iter().chain([&k]);
+        let read: BTreeSet<usize> = forms.flat_map(|&j| self.forms[j].terms.keys().copied()).collect();
+        read.iter().filter(|j| **j != k && !between.contains(j)).count()
+    }
+
+    /// How many other unknowns the residual of an unknown reads in the end; more than `enough` are not counted.
+    fn further_in(&self, k: usize, enough: usize) -> usize {
+        let (mut seen, mut found) = (vec![false; self.symbols.len()], 0);
+        seen[k] = true;
+        let mut open = vec![k];
+        while let Some(j) = open.pop().filter(|_| found <= enough) {
+            for &read in self.forms[j].terms.keys() {
+                if !std::mem::replace(&mut seen[read], true) {
+                    if read < self.unknowns { found += 1 } else { open.push(read) }
+                }
+            }
+        }
+        found
+    }
+
+    /// Puts variables in, from the outside in; of those on one level first what takes least.
+    fn put_in_all(&mut self, variables: BTreeSet<usize>, order: &[usize]) -> Option<()> {
+        let is_alias = |open: &Self, k: usize| open.forms[k].terms.len() <= 1 && open.forms[k].rest == ZERO;
+        let place = |open: &Self, k: usize| {
+            let level = if is_alias(open, k) { 0 } else { order[k] };
+            (level, open.readers[k].len() * (open.forms[k].terms.len() + 1), k)
+        };
+        let mut places: FxHashMap<usize, (usize, usize, usize)> = FxHashMap::default();
+        let mut queue = BTreeSet::new();
+        for k in variables.into_iter().filter(|&k| !self.gone[k]) {
+            places.insert(k, place(self, k));
+            queue.insert(places[&k]);
+        }
+        while let Some((.., k)) = queue.pop_first() {
+            if self.work > WORK * self.symbols.len() {
+                return None;
+            }
+            places.remove(&k);
+            self.settle(k);
+            for touched in self.put_in(k) {
+                let Some(before) = places.get_mut(&touched) else { continue };
+                queue.remove(before);
+                *before = place(self, touched);
+                queue.insert(*before);
+            }
+        }
+        Some(())
+    }
+
+    /// Leaves out what is zero and gives names to what is long.
+    fn settle(&mut self, k: usize) {
+        let (own, mut terms) = (self.symbols[k], std::mem::take(&mut self.forms[k].terms));
+        terms.retain(|&j, e| {
+            let zero = self.recognition.is_zero(self.x, *e);
+            if zero {
+                self.readers[j].remove(&k);
+            } else if k >= self.unknowns || j != k {
+                let by = self.symbols[j];
+                *e = self.recognition.short(self.x, *e, NAMED, |x| x.gain(own, by));
+            }
+            !zero
+        });
+        let rest = self.forms[k].rest;
+        // The name of the rest without unknowns is taken.
+        let rest =
+            if k < self.unknowns { rest } else { self.recognition.short(self.x, rest, NAMED, |x| x.gain(own, own)) };
+        self.forms[k] = Form { terms, rest };
+    }
+
+    /// Turns the residual of an unknown into its definition.
+    fn solve(&mut self, k: usize) -> Option<()> {
+        self.settle(k);
+        let own = self.symbols[k];
+        let Form { mut terms, rest } =
+            std::mem::replace(&mut self.forms[k], Form { terms: BTreeMap::new(), rest: ZERO });
+        let pivot = terms.remove(&k)?;
+        self.readers[k].remove(&k);
+        let one = self.x.int(1);
+        let inverse = self.x.div(one, pivot);
+        let inverse = self.recognition.short(self.x, inverse, NAMED, |x| x.gain(own, own));
+        let minus = self.x.neg(inverse);
+        let right = self.value(&terms, rest);
+        let right = self.x.neg(right);
+        for (&j, e) in &mut terms {
+            let by = self.symbols[j];
+            let solved = self.x.mul(&[*e, minus]);
+            *e = self.recognition.short(self.x, solved, NAMED, |x| x.loop_gain(own, by));
+        }
+        let rest = self.x.mul(&[rest, minus]);
+        let rest = self.recognition.short(self.x, rest, NAMED, |x| x.bias(own));
+        self.eliminated.push(Eliminated { unknown: own, pivot, right });
+        self.forms[k] = Form { terms, rest };
+        Some(())
+    }
+
+    /// Puts the form of a variable in wherever it is read. The variables whose forms, or whose readers, are others then.
+    fn put_in(&mut self, k: usize) -> BTreeSet<usize> {
+        self.gone[k] = true;
+        let form = self.forms[k].clone();
+        self.work += form.terms.len() * self.readers[k].len();
+        let mut touched = std::mem::take(&mut self.readers[k]);
+        for &row in &touched {
+            let Some(factor) = self.forms[row].terms.remove(&k) else { continue };
+            for (&j, &e) in &form.terms {
+                let term = self.x.mul(&[factor, e]);
+                let before = self.forms[row].terms.get(&j).copied().unwrap_or(ZERO);
+                let sum = self.x.add(&[before, term]);
+                if sum == ZERO {
+                    self.forms[row].terms.remove(&j);
+                    self.readers[j].remove(&row);
+                } else {
+                    self.forms[row].terms.insert(j, sum);
+                    self.readers[j].insert(row);
+                }
+            }
+            let rest = self.x.mul(&[factor, form.rest]);
+            self.forms[row].rest = self.x.add(&[self.forms[row].rest, rest]);
+        }
+        for &j in form.terms.keys() {
+            self.readers[j].remove(&k);
+            touched.insert(j);
+        }
+        touched
+    }
+
+    /// A form by the values of variables, of which it counts what the unknowns make of them.
+    fn value(&mut self, terms: &BTreeMap<usize, Expr>, rest: Expr) -> Expr {
+        let mut sum = vec![rest];
+        for (&j, &e) in terms {
+            let own = self.x.sym(self.symbols[j]);
+            let moved = self.x.sub(own, self.rests[j]);
+            sum.push(self.x.mul(&[e, moved]));
+        }
+        self.x.add(&sum)
+    }
+
+    fn finish(mut self, body: &[(Symbol, Expr)]) -> Option<Recursion> {
+        let left: Vec<usize> = (0..self.unknowns).filter(|&k| !self.gone[k]).collect();
+        let mut rows = Vec::with_capacity(left.len());
+        for &k in &left {
+            self.settle(k);
+            let form = &self.forms[k];
+            let place = |j: &usize| left.binary_search(j).expect("only these are left");
+            rows.push((form.terms.iter().map(|(j, &e)| (place(j), e)).collect(), form.rest));
+        }
+        let mut values: Vec<(Symbol, Expr)> = Vec::with_capacity(self.eliminated.len() + body.len());
+        for k in (0..self.unknowns).filter(|&k| self.gone[k]).collect::<Vec<_>>() {
+            let own = self.symbols[k];
+            let Form { terms, rest } = self.forms[k].clone();
+            let value = self.value(&terms, rest);
+            values.push((own, value));
+        }
+        values.extend(body);
+        let after = in_order(self.x, values)?;
+        Some(Recursion { named: self.recognition.named, left, rows, eliminated: self.eliminated, after })
+    }
+}
+
+/// Definitions, each behind those that it reads; `None` if they read each other.
+fn in_order(x: &Exprs, values: Vec<(Symbol, Expr)>) -> Option<Vec<(Symbol, Expr)>> {
+    let of: FxHashMap<Symbol, Expr> = values.iter().copied().collect();
+    let mut done: FxHashMap<Symbol, bool> = FxHashMap::default();
+    let mut ordered = Vec::with_capacity(values.len());
+    for (symbol, _) in values {
+        let mut open = vec![(symbol, false)];
+        while let Some((symbol, read)) = open.pop() {
+            let Some(&value) = of.get(&symbol) else { continue };
+            if read {
+                done.insert(symbol, true);
+                ordered.push((symbol, value));
+                continue;
+            }
+            match done.get(&symbol) {
+                Some(true) => continue,
+                // It waits for something that reads it.
+                Some(false) => return None,
+                None => {}
+            }
+            done.insert(symbol, false);
+            open.push((symbol, true));
+            open.extend(x.symbols_of(value).into_iter().filter(|s| done.get(s) != Some(&true)).map(|s| (s, false)));
+        }
+    }
+    Some(ordered)
+}
+
+fn is_symmetric(n: usize, matrix: &[f64]) -> bool {
+    let size = |k: usize| matrix[k * n + k].abs();
+    (0..n).all(|i| {
+        (0..i).all(|j| {
+            let (a, b) = (matrix[i * n + j], matrix[j * n + i]);
+            (a - b).abs() <= ROUNDING * (a.abs() + b.abs() + (size(i) * size(j)).sqrt())
+        })
+    })
+}
+
+/// Whether a symmetric matrix is definite.
+fn has_positive_pivots(n: usize, mut matrix: Vec<f64>) -> bool {
+    for k in 0..n {
+        let pivot = matrix[k * n + k];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return false;
+        }
+        for i in k + 1..n {
+            let factor = matrix[i * n + k] / pivot;
+            if factor != 0.0 {
+                (k..n).for_each(|j| matrix[i * n + j] -= factor * matrix[k * n + j]);
+            }
+        }
+    }
+    true
+}
