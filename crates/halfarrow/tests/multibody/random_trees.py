@@ -554,6 +554,10 @@ def flat(rng, machine, bodies):
             machine.forces.append(Force("Force", name, mark(max(a, b)), world=int(rng.random() < 0.5), value=np.array([*rng.uniform(-5, 5, 2), 0])))
 
 
+# Machines of seeds from here on have many bodies: rates are eliminated from the leaves on.
+LONG = 20000
+
+
 def machine_of(seed, small=None):
     """The machine of a seed; `small` keeps to few bodies: four of five."""
     global decimals
@@ -566,7 +570,12 @@ def machine_of(seed, small=None):
         draw = rng.random()
         most = 3 if small else 7
         try:
-            if draw < 0.30:
+            if seed >= LONG:
+                machine.kind = "long"
+                grow(rng, machine, int(rng.integers(8, 17)))
+                if draw < 0.3 and not add_loop(rng, machine):
+                    raise Again
+            elif draw < 0.30:
                 machine.kind = "tree"
                 grow(rng, machine, int(rng.integers(1, most + 1)))
                 weld_some(rng, machine)
