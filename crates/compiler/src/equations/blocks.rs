@@ -32,6 +32,10 @@ const LONGEST_ROWS: [usize; 5] = [usize::MAX, 16, 8, 4, 2];
 const MUCH_FEWER: f64 = 0.75;
 /// and of a loop with more unknowns than [`FEW`] where it takes less than this part.
 const FEWER: f64 = 0.9;
+/// Operations of a factorisation by indices take so many times as long as those that are written out.
+const SPARSE: f64 = 2.0;
+/// What the symmetry of a full matrix leaves of the operations of its factorisation.
+const WRITTEN_OUT_SYMMETRIC: f64 = 0.5;
 
 /// Matrices of so many rates are looked at for entries that mirror each other.
 const MIRRORED: usize = 4;
@@ -247,7 +251,8 @@ pub(super) fn operations(x: &Exprs, named: &[(Symbol, Expr)], rows: &[Row], othe
     }
     let pattern = Pattern::new(rows.iter().map(|row| row.0.iter().map(|e| e.0)));
     let solved = SymbolicFactors::of_large(&pattern).map_or(full_operations(pattern.size()), |f| f.operations());
-    x.cost(&roots).total() as f64 + solved as f64 / 2.0
+    let weight = if pattern.size() > FEW { SPARSE } else { WRITTEN_OUT_SYMMETRIC };
+    x.cost(&roots).total() as f64 + weight * solved as f64
 }
 
 /// Steps of a loop that is gone through from its leaves.
