@@ -10,13 +10,13 @@ use smallvec::SmallVec;
 use super::definitions::{Definition, Definitions};
 use super::forms::LinearForms;
 use super::recursion::{Eliminated, Recursion, recursion};
-use super::supports::Supports;
+use super::supports::{Supports, to_solve};
 use super::symmetry::mirrored;
 use super::{EquationStep, LinearBlock, NewtonBlock};
 use crate::algebra::{Expr, Exprs, SparseRow, Symbol, ZERO};
 use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
-use crate::sparse::{Pattern, SparseMatrix, SymbolicFactors, full_operations};
+use crate::sparse::{Pattern, SparseMatrix};
 
 /// Terms that may be formed in the search for short forms of the entries of a matrix.
 const WORK: u64 = 1_000_000;
@@ -161,7 +161,6 @@ fn block(
     let torn = tear(d, &symbols, first);
     let rest: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
     let body: Vec<(Symbol, Expr)> = components(d, &rest).into_iter().map(|c| (c[0], d.of[&c[0]].expr())).collect();
-    let elements = elements_of(d, &symbols);
     let mut residuals = Vec::with_capacity(torn.len());
     for &t in &torn {
         residuals.push(match d.of[&t] {
@@ -182,7 +181,7 @@ fn block(
     let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
     let Some((named, mut rows)) = forms else {
-        let inner = body.clone();
+        let (inner, elements) = (body.clone(), elements_of(d, &symbols));
         ordered.steps.push(NewtonBlock { unknowns: torn, body: inner, residuals, elements }.into());
         ordered.assign(body);
         return Ok(());
@@ -250,9 +249,8 @@ pub(super) fn operations(x: &Exprs, named: &[(Symbol, Expr)], rows: &[Row], othe
         open.extend_from_slice(&roots[before..]);
     }
     let pattern = Pattern::new(rows.iter().map(|row| row.0.iter().map(|e| e.0)));
-    let solved = SymbolicFactors::of_large(&pattern).map_or(full_operations(pattern.size()), |f| f.operations());
     let weight = if pattern.size() > FEW { SPARSE } else { WRITTEN_OUT_SYMMETRIC };
-    x.cost(&roots).total() as f64 + weight * solved as f64
+    x.cost(&roots).total() as f64 + weight * to_solve(&pattern) as f64
 }
 
 /// Steps of a loop that is gone through from its leaves.

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::algebra::{Evaluator, Expr, Exprs, Symbol};
+use crate::algebra::{Evaluator, Expr, Exprs, Symbol, mix};
 use crate::ids::Id;
 
 /// How many points are tried.
@@ -30,19 +30,13 @@ pub fn solved(n: usize, mut full: Vec<f64>, mut right: Vec<f64>) -> Vec<f64> {
     right
 }
 
-/// A value between 1 and 2 that no other symbol has at this point, nor do sums or products of others. Source of the mixing:
-/// Steele, Lea, Flood, Fast splittable pseudorandom number generators, 2014 (its numbers).
+/// A value between 1 and 2 that no other symbol has at this point, nor do sums or products of others.
 pub fn somewhere(point: usize, symbol: Symbol) -> f64 {
     mixed(point, 2 * symbol.index() as u64)
 }
 
 fn mixed(point: usize, number: u64) -> f64 {
-    let mut bits = (number + 1) * POINTS as u64 + point as u64;
-    bits = bits.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^= bits >> 31;
-    f64::from_bits(1.0f64.to_bits() | (bits >> 12))
+    f64::from_bits(1.0f64.to_bits() | (mix(point as u64, number) >> 12))
 }
 
 /// The value of an expression at a point where symbols have these values. What has a corner or a jump has a value of its own,

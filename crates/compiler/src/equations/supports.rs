@@ -38,10 +38,14 @@ impl Supports {
 
     /// Additions and products to form the matrix, to factor it and to solve the equations.
     pub fn operations(&self) -> u64 {
-        let full = full_operations(self.pattern.size());
-        let sparse = SymbolicFactors::of_large(&self.pattern).map_or(full, |factors| factors.operations());
-        sparse + 2 * self.pattern.len() as u64
+        to_solve(&self.pattern) + 2 * self.pattern.len() as u64
     }
+}
+
+/// Additions and products to solve equations with these entries once.
+pub fn to_solve(pattern: &Pattern) -> u64 {
+    let full = full_operations(pattern.size());
+    SymbolicFactors::of_large(pattern).map_or(full, |factors| factors.operations())
 }
 
 fn reads(x: &Exprs, e: Expr, of: &BTreeMap<Symbol, BTreeSet<usize>>) -> BTreeSet<usize> {
