@@ -202,6 +202,34 @@ def test_what_always_kills_its_worker_is_given_up(car: ha.Model) -> None:
     assert len(made) == 3 and caught.value.result is None
 
 
+class Losing(Executor):
+    """Loses what some parts came to, and tells so with an exception of its own, as Dask does."""
+
+    _max_workers = 2
+
+    def __init__(self, losses: int) -> None:
+        self.inner = ThreadPoolExecutor(2)
+        self.losses, self.begun = losses, 0
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future = self.inner.submit(fn, *args, **kwargs)
+        self.begun += 1
+        if self.begun > 6 and self.losses:
+            self.losses -= 1
+            lost: Future[Any] = Future()
+            lost.set_exception(TypeError("cannot unpack"))
+            return lost
+        return future
+
+
+def test_a_part_that_an_executor_loses_is_begun_again(car: ha.Model) -> None:
+    there, here = ask(car, executor=(executor := Losing(4)), chunk=3), ask(car)
+    assert not executor.losses and content(there) == content(here) and there.audit == here.audit
+    with pytest.raises(ha.RunError, match=r"a worker has failed: TypeError\('cannot unpack'\); \d+ of 75 sets are done"):
+        ask(car, executor=(executor := Losing(1000)), chunk=3)
+    assert executor.losses > 950
+
+
 def test_dask_and_loky_lose_nothing(car: ha.Model) -> None:
     from distributed import Client, LocalCluster
     from joblib.externals.loky import get_reusable_executor

@@ -11,9 +11,9 @@ import pickle
 import threading
 import time
 import warnings
-from collections import OrderedDict
+from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -62,7 +62,7 @@ _KEPT = 8
 # Parts that wait for each worker, and workers where an executor does not tell.
 _AHEAD = 3
 _UNKNOWN = 64
-# Executors that may break one after the other with nothing done.
+# Executors that may break one after the other with nothing done, and times that an executor may lose a part.
 _IN_VAIN = 3
 
 
@@ -682,6 +682,7 @@ class _Parts:
         ready: SimpleQueue[Future[Done | None]] = SimpleQueue()
         waiting: dict[Future[Done | None], tuple[int, int]] = {}
         raised: BaseException | None = None
+        lost: Counter[tuple[int, int]] = Counter()
 
         def submit(part: tuple[int, int], sent: _Job | None) -> None:
             first, end = part
@@ -700,19 +701,23 @@ class _Parts:
             while waiting:
                 future = ready.get()
                 part = waiting.pop(future)
+                done: Done | None = None
                 try:
                     done = future.result()
                 except Exception as why:
-                    # Others may be done; nothing more is begun.
-                    raised = raised or why
-                    for other in waiting:
-                        other.cancel()
-                    continue
+                    lost[part] += 1
+                    if raised is not None or lost[part] == _IN_VAIN or not _lost(why):
+                        # Others may be done; nothing more is begun.
+                        raised = raised or why
+                        for other in waiting:
+                            other.cancel()
+                        continue
                 if done is not None:
                     self.add(done)
                 if raised is None:
                     try:
                         if done is None:
+                            # The worker has not the text, or died with what it had computed.
                             submit(part, self.job)
                         else:
                             begin(1, None)
@@ -724,6 +729,12 @@ class _Parts:
                 future.cancel()
             return why
         return raised
+
+
+def _lost(why: Exception) -> bool:
+    """Whether a part may come out when it is begun again: an executor has mistaken a result that went with its worker, as Dask
+    does where one is killed between computing and sending (``TypeError`` in ``distributed.cfexecutor``)."""
+    return not isinstance(why, (Error, Warning, BrokenExecutor, CancelledError))
 
 
 def _workers(executor: Executor) -> int | None:
