@@ -10,6 +10,9 @@ const ROUNDED: f64 = f64::EPSILON;
 /// A value within so many bounds of its error is 0.
 const BOUNDS: f64 = 8.0;
 
+/// Pivots whose digits differ by fewer bits are as good as each other.
+const STEP_OF_DOUBT: f64 = 8.0;
+
 /// A value with a bound of its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bounded {
@@ -24,6 +27,11 @@ impl Bounded {
     }
     fn rounded(value: f64, error: f64) -> Bounded {
         Bounded { value, error: error + ROUNDED * value.abs() }
+    }
+    /// How many digits are lost, in steps of two or three: what is divided by passes them on to all that follows.
+    fn doubt(self) -> u32 {
+        let lost = (self.error / self.value).abs() / EVALUATED;
+        if lost > 1.0 { (lost.log2() / STEP_OF_DOUBT) as u32 } else { 0 }
     }
     fn vanishes(self) -> bool {
         // What has no value is no pivot.
@@ -73,7 +81,7 @@ impl Coefficients for Estimates {
     }
     fn quality(&self, e: Estimate) -> (Quality, u32) {
         let unit = [e.generic, e.given].iter().all(|b| b.value.abs() == 1.0 && b.error == 0.0);
-        (if unit { Quality::Unit } else { Quality::Number }, 0)
+        (if unit { Quality::Unit } else { Quality::Number }, e.generic.doubt().max(e.given.doubt()))
     }
     fn is_small(&self, _: &mut NumericPoint, _: &[(usize, Estimate)], _: Estimate) -> bool {
         false
@@ -97,5 +105,28 @@ impl Coefficients for Estimates {
             true => b,
             false => Bounded::rounded(1.0 / b.value, b.error / (b.value * b.value)),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algebra::{SparseRow, eliminate};
+
+    /// A coefficient that cancellation has left with two digits is no pivot while there are others: divided by it, the rest
+    /// would count as zero.
+    #[test]
+    fn pivots_keep_digits() {
+        let exact = |v: f64| Estimate::new(v, v);
+        let doubtful = Estimates.plus(exact(1.0 + 1e-10), exact(-1.0));
+        assert_eq!(Estimates.zero(doubtful), Zero::No);
+        let rows = [
+            [doubtful, exact(1.0), exact(0.5)],
+            [exact(2.0), exact(2.0), exact(3.0)],
+            [exact(2.0), exact(2.0), exact(4.0)],
+        ];
+        let rows = rows.map(|row| SparseRow(row.into_iter().enumerate().collect())).to_vec();
+        let done = eliminate(&mut Estimates, rows, &[vec![0], vec![1], vec![2]]);
+        assert_eq!((done.pivots.len(), done.rest.len()), (3, 0));
     }
 }

@@ -142,6 +142,9 @@ pub(super) struct Approximate<R> {
     error: f64,
 }
 
+/// Values at one point; none where an expression has none.
+pub(super) type Values<R> = FxHashMap<Expr, Option<Approximate<R>>>;
+
 /// What a value says about whether it is zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
@@ -163,8 +166,12 @@ pub(super) struct Point<'a> {
 impl Point<'_> {
     /// Whether the expression is zero at this point.
     pub fn verdict<R: Real>(&self, e: Expr, constants: &mut Consts) -> Verdict {
-        let mut values: FxHashMap<Expr, Option<Approximate<R>>> = FxHashMap::default();
-        let Some(result) = self.value::<R>(e, &mut values, constants) else { return Verdict::Unknown };
+        self.verdict_by(e, &mut Values::<R>::default(), constants)
+    }
+
+    /// The same, with values at this point that are known already, and those that are found.
+    pub fn verdict_by<R: Real>(&self, e: Expr, values: &mut Values<R>, constants: &mut Consts) -> Verdict {
+        let Some(result) = self.value::<R>(e, values, constants) else { return Verdict::Unknown };
         if result.value.size() > result.error + 2.0 {
             return Verdict::Nonzero;
         }
@@ -179,12 +186,7 @@ impl Point<'_> {
         if exact || result.error <= greatest - R::BITS * 0.6 { Verdict::Zero } else { Verdict::Unknown }
     }
 
-    fn value<R: Real>(
-        &self,
-        e: Expr,
-        values: &mut FxHashMap<Expr, Option<Approximate<R>>>,
-        constants: &mut Consts,
-    ) -> Option<Approximate<R>> {
+    fn value<R: Real>(&self, e: Expr, values: &mut Values<R>, constants: &mut Consts) -> Option<Approximate<R>> {
         let known = &*values;
         for part in self.pool.below(&[e], &|e| !known.contains_key(&e)) {
             let place = (self.number, self.given, part);
@@ -214,7 +216,7 @@ impl Point<'_> {
     fn symbol<R: Real>(
         &self,
         symbol: Symbol,
-        values: &mut FxHashMap<Expr, Option<Approximate<R>>>,
+        values: &mut Values<R>,
         constants: &mut Consts,
     ) -> Option<Approximate<R>> {
         let facts = self.pool.facts(symbol);
@@ -235,12 +237,7 @@ impl Point<'_> {
         Some(rounded(R::rational(&value, constants), f64::NEG_INFINITY))
     }
 
-    fn node<R: Real>(
-        &self,
-        node: &Node,
-        values: &FxHashMap<Expr, Option<Approximate<R>>>,
-        constants: &mut Consts,
-    ) -> Option<Approximate<R>> {
+    fn node<R: Real>(&self, node: &Node, values: &Values<R>, constants: &mut Consts) -> Option<Approximate<R>> {
         let at = |e: &Expr| values[e].as_ref();
         match node {
             Node::Number(value) => Some(match value.as_integer() {

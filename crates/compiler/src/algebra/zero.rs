@@ -5,7 +5,7 @@ use super::exprs::Exprs;
 use super::field;
 use super::fingerprint::{GENERIC, GIVEN, POISON};
 use super::node::{Expr, Node, Symbol};
-use super::precise::{Calls, Point, Verdict};
+use super::precise::{Calls, Point, Values, Verdict};
 use astro_float_num::{BigFloat, Consts};
 use rustc_hash::FxHashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -14,6 +14,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const POINTS: usize = 12;
 /// Points that are tried for that: at some of them the expression may be undefined.
 const TRIED: u64 = 48;
+/// Values that are kept of the first point.
+const KEPT_AT_MOST: usize = 1 << 22;
 
 /// What values at random points have told: it stays true, since a pool never changes what it has.
 #[derive(Debug, Default)]
@@ -24,6 +26,9 @@ pub(super) struct Told {
     given: Mutex<FxHashMap<Symbol, f64>>,
     /// Functions of many digits at the points: most of what a value costs.
     calls: Mutex<Calls>,
+    /// Values of few digits at the first point, in general and at the given parameters: most expressions that are not zero
+    /// show it there, and long ones have their parts in common.
+    first: Mutex<[Values<f64>; 2]>,
 }
 
 impl Clone for Told {
@@ -36,6 +41,10 @@ impl Clone for Told {
 impl Told {
     pub(super) fn calls(&self) -> MutexGuard<'_, Calls> {
         self.calls.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn first(&self) -> MutexGuard<'_, [Values<f64>; 2]> {
+        self.first.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn given(&self) -> MutexGuard<'_, FxHashMap<Symbol, f64>> {
@@ -125,7 +134,17 @@ impl Exprs {
         let mut zeros = 0;
         for number in 0..TRIED {
             let point = Point { pool: self, number, given };
-            if point.verdict::<f64>(e, &mut constants) == Verdict::Nonzero {
+            let roughly = match number {
+                0 => {
+                    let known = &mut self.told.first()[usize::from(given)];
+                    if known.len() > KEPT_AT_MOST {
+                        known.clear();
+                    }
+                    point.verdict_by::<f64>(e, known, &mut constants)
+                }
+                _ => point.verdict::<f64>(e, &mut constants),
+            };
+            if roughly == Verdict::Nonzero {
                 return false;
             }
             match point.verdict::<BigFloat>(e, &mut constants) {

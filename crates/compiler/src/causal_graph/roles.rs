@@ -89,7 +89,14 @@ impl Net {
         let (done, outputs) = self.eliminated_over(x, rows, preferences, causality);
         let mut defined = vec![false; self.symbols.len()];
         done.pivots.iter().for_each(|pivot| defined[pivot.column] = true);
+        // Each port gives one of its variables and is given the other, whatever rounding takes for zero.
+        let one_of_each = outputs.iter().all(|(&p, &role)| {
+            let port = &self.ports[p];
+            let output = port.output(role);
+            defined[output] && !defined[port.effort + port.flow - output]
+        });
         let regular = !doubtful
+            && one_of_each
             && done.rest.is_empty()
             && done.degenerate.is_empty()
             && self.inner.iter().all(|&c| defined[c])

@@ -10,16 +10,22 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::algebra::{Expr, Exprs, ONE, Residue, Symbol};
+use crate::bond_graph::{BondGraph, Kind, Meaning, ResistorLaw, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Ports, Role, stays};
 use crate::ids::Map;
 
 /// Terms that may be formed in the search for terms that cancel.
 const WORK: usize = 1_000_000;
+/// Rows with more terms, or in which terms cancel through more variables than this, stay as they are where what cancels in
+/// them is known: written out, each term takes as much as the chain is long, and what is saved is rounding.
+const LONG_ROW: usize = 12;
+const LONG_WAY: usize = 40;
 /// A coefficient that is written longer than this is no short one.
 const SHORT: u64 = 40;
 
 /// The rows of a graph, worked out when they are asked for.
 pub struct Rows<'a> {
+    graph: Option<&'a BondGraph>,
     ports: Option<&'a Ports>,
     /// Who gives each input of the junction structure.
     givers: Map<Symbol, &'a PortState>,
@@ -47,12 +53,14 @@ impl<'a> Rows<'a> {
         let one = causal.graph.exprs.residue(ONE);
         let residues = known.iter().map(|(&s, row)| (s, row.0.iter().map(|t| (t.0, one)).collect())).collect();
         let short = known.iter().map(|(&s, row)| (s, Some(row.clone()))).collect();
-        Rows { ports: Some(ports), givers, zero, known, residues, short, cancelling: BTreeSet::new() }
+        let graph = Some(&causal.graph);
+        Rows { graph, ports: Some(ports), givers, zero, known, residues, short, cancelling: BTreeSet::new() }
     }
 
     /// No rows: where variables are defined along strokes they may run in circles.
     pub fn none() -> Rows<'a> {
         Rows {
+            graph: None,
             ports: None,
             givers: Map::new(),
             zero: BTreeSet::new(),
@@ -198,8 +206,9 @@ impl<'a> Rows<'a> {
     /// What defines each variable: triangular, and over what elements give where terms cancel. Variables that are nothing
     /// but others give way to these.
     pub fn definitions(&mut self, x: &mut Exprs) -> Vec<(Symbol, Combination)> {
-        let Some(ports) = self.ports else { return Vec::new() };
-        let WrittenOut { needed, as_short } = written_out(x, ports);
+        let (Some(graph), Some(ports)) = (self.graph, self.ports) else { return Vec::new() };
+        let giver = |input: &Symbol| self.givers.get(input).copied();
+        let WrittenOut { needed, as_short } = written_out(x, graph, ports, &giver);
         let mut along: Map<Symbol, Combination> = Map::new();
         for (symbol, through) in needed.iter().filter_map(|(s, through)| Some((*s, through.as_ref()?))) {
             let row = self.put_through(x, symbol, through, &along).expect("it is defined");
@@ -311,10 +320,16 @@ fn is_short(x: &mut Exprs, row: &Combination) -> bool {
 }
 
 /// What of the definitions is written out, as far as a bound of work goes.
-fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
+fn written_out<'a>(
+    x: &Exprs,
+    graph: &BondGraph,
+    ports: &'a Ports,
+    giver: &dyn Fn(&Symbol) -> Option<&'a PortState>,
+) -> WrittenOut {
     let mut found = WrittenOut::default();
     let mut known: Map<Symbol, Row> = Map::with_capacity(x.symbol_count());
     let mut along: Map<Symbol, Row> = Map::new();
+    let mut inputs = Inputs { x, graph, ports, giver, settled: Map::new() };
     let mut work = 0;
     for &first in ports.definitions.keys() {
         let mut open = vec![first];
@@ -330,11 +345,15 @@ fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
             } else if !cancelled.is_empty() {
                 let (through, short) = through(x, ports, top, &cancelled, (&known, &along));
                 work += through.len();
-                let through = (short.len() < row.len()).then(|| {
-                    along.insert(top, short);
-                    through
-                });
-                found.needed.push((top, through));
+                let least = short.len().min(row.len());
+                let long = least > definition.0.len().max(LONG_ROW) || through.len() > LONG_WAY;
+                if !(long && cancelled.iter().all(|&s| inputs.is_known_before(s, top))) {
+                    let through = (short.len() < row.len()).then(|| {
+                        along.insert(top, short);
+                        through
+                    });
+                    found.needed.push((top, through));
+                }
             }
             if row.len() <= definition.0.len() && ports.degenerate.is_empty() {
                 found.as_short.insert(top, ());
@@ -346,6 +365,76 @@ fn written_out(x: &Exprs, ports: &Ports) -> WrittenOut {
         }
     }
     found
+}
+
+/// What elements give, and when it is known.
+struct Inputs<'a, 'g> {
+    x: &'g Exprs,
+    graph: &'g BondGraph,
+    ports: &'a Ports,
+    giver: &'g dyn Fn(&Symbol) -> Option<&'a PortState>,
+    /// Of laws whose variable follows from states and sources alone: the variables that it is computed from. None of others.
+    settled: Map<Symbol, Option<BTreeSet<Symbol>>>,
+}
+
+impl Inputs<'_, '_> {
+    /// Whether an input is known without a variable of the junction structure: a state or a source, or a law that reads what
+    /// follows from these, and not through that variable.
+    fn is_known_before(&mut self, input: Symbol, variable: Symbol) -> bool {
+        if !self.settled.contains_key(&input) {
+            let settled = self.read_for(input);
+            self.settled.insert(input, settled);
+        }
+        self.settled[&input].as_ref().is_some_and(|read| !read.contains(&variable))
+    }
+
+    fn read_for(&self, input: Symbol) -> Option<BTreeSet<Symbol>> {
+        let mut read = BTreeSet::new();
+        let mut open = Vec::new();
+        match (self.giver)(&input) {
+            Some(law) if matches!(law.role, Role::Algebraic(_)) && self.is_of_itself(law) => open.push(law.output),
+            _ => return self.is_given(input).then_some(read),
+        }
+        while let Some(next) = open.pop() {
+            match self.ports.definitions.get(&next) {
+                Some(definition) if read.insert(next) => open.extend(definition.0.iter().map(|t| t.0)),
+                None if !self.is_given(next) => return None,
+                _ => {}
+            }
+        }
+        Some(read)
+    }
+
+    /// Whether an input is that of a state or a source.
+    fn is_given(&self, input: Symbol) -> bool {
+        match (self.giver)(&input) {
+            Some(port) => matches!(port.role, Role::Independent | Role::Source) && self.is_of_itself(port),
+            None => self.ports.virtual_speeds.iter().any(|v| v.speed == input),
+        }
+    }
+
+    /// Whether what an element gives reads no other bond.
+    fn is_of_itself(&self, port: &PortState) -> bool {
+        let bond = &self.graph.bonds[self.graph.bond_of(port.port)];
+        let (law, also) = match &self.graph.elements[port.port.element].kind {
+            Kind::Resistor(laws) => match laws[..] {
+                [ResistorLaw::Resistive(law) | ResistorLaw::Conductive(law) | ResistorLaw::Implicit(law)] => (law, law),
+                _ => return false,
+            },
+            Kind::Inertance(storage) | Kind::Compliance(storage) => match storage.laws[port.port.port as usize] {
+                StorageLaw::Integral(law) | StorageLaw::Derivative(law) | StorageLaw::Implicit(law) => (law, law),
+                StorageLaw::Known { displacement, law } => (displacement, law),
+            },
+            Kind::EffortSource { value } | Kind::FlowSource { value } => (*value, *value),
+            _ => return false,
+        };
+        let foreign = |s: Symbol| match self.graph.variables.get(&s).map(|v| v.meaning) {
+            Some(Meaning::Effort(_) | Meaning::Flow(_)) => s != bond.effort && s != bond.flow,
+            Some(Meaning::Rate(_)) | None => true,
+            Some(_) => false,
+        };
+        [law, also].into_iter().all(|e| !self.x.depends_on_any(e, &foreign))
+    }
 }
 
 /// The variables that have to be put into a row so that the shares of others cancel in it, in order, and its terms then.
