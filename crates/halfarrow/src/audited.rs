@@ -11,7 +11,7 @@ use std::sync::Arc;
 use beside::{Part, PlacedAuditor, Recorded, look};
 use halfarrow_audit::{self as audit, Audit, Finding};
 use halfarrow_compiler::bond_graph::{BondGraph, Kind};
-use halfarrow_compiler::program::Observed;
+use halfarrow_compiler::program::{Observed, ObservedKind, bare_name};
 use halfarrow_exec as exec;
 use halfarrow_sim::{
     Affected, Crawl, Events as _, Failure, Options, Sink, Stopped, Summary, simulate, simulate_implicit,
@@ -174,6 +174,8 @@ enum Origin {
 /// What the audit asks for of what can be recorded.
 struct Wanted<'p> {
     observed: &'p [Observed],
+    /// Whether some of them are efforts without what a constraint carries; these come last.
+    has_bare: bool,
     /// Where each name that has a value stands among these, made when one is not found in its turn.
     index_of: OnceCell<FxHashMap<&'p str, u32>>,
     /// Behind what was found last: among states, among other variables, and among those that are asked for after them.
@@ -208,6 +210,7 @@ impl<'p> Wanted<'p> {
         let variables = observed.iter().position(|o| !o.default).unwrap_or(observed.len());
         Wanted {
             observed,
+            has_bare: observed.last().is_some_and(|o| o.kind == ObservedKind::Bare),
             index_of: OnceCell::new(),
             next: [0, variables, variables],
             special,
@@ -234,9 +237,11 @@ impl<'p> Wanted<'p> {
         Some(*known.get(name)? as usize)
     }
 
-    /// The column of a variable, from now on if it had none; `None` if it has no value.
+    /// The column of a variable, from now on if it had none; `None` if it has no value. Of an effort that bears what a
+    /// constraint at the rates carries it is what the junctions balance by.
     fn column_of(&mut self, name: &str) -> Option<usize> {
-        let index = self.index_of(name)?;
+        let bare = if self.has_bare { self.index_of(&bare_name(name)) } else { None };
+        let index = bare.or_else(|| self.index_of(name))?;
         let column = &mut self.columns[index];
         if *column == NONE {
             *column = self.chosen.len() as u32;

@@ -134,17 +134,24 @@ fn guesses_that_fit_are_left() {
     }
 }
 
-/// What a rod holds goes through the joints between its ends, by the balance of forces.
+/// What a rod holds goes through the joints between its ends, by the balance of forces: where its bonds are drawn, and where it
+/// acts at the rates and its sources say what they carry.
 #[test]
 fn joints_carry_what_closes_their_loop() {
-    let model = Model::from_text("reaction.bond", include_str!("multibody/reaction.bond"), &[])
-        .unwrap_or_else(|error| panic!("{error}"));
-    let names = ["slide.sum.x.e", "slide.sum.y.e", "slide.sum.z.e", "rod.length.e"].map(String::from).to_vec();
-    let run = Run { to: 0.1, every: Some(0.1), record: Record::Names(names), ..Run::default() };
-    let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
-    // The multiplier of |d|² pulls with twice itself times the length, 50/3 N.
-    for (column, expected) in trace.columns.iter().zip([0.0, 0.0, 2.0 * 9.81 - 40.0 / 3.0, -5.0 / 3.0]) {
-        let off = column.values.iter().fold(0.0f64, |most, v| most.max((v - expected).abs()));
-        assert!(off < 1e-13, "{}: {:?} instead of {expected}", column.name, column.values);
+    let drawn = include_str!("multibody/reaction.bond").to_owned() + "output rail = 2*slide.sum.z.e\n";
+    let at_the_rates = drawn.replace("through = 1", "through = 0");
+    assert_ne!(drawn, at_the_rates);
+    for text in [drawn, at_the_rates] {
+        let model = Model::from_text("reaction.bond", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let names =
+            ["slide.sum.x.e", "slide.sum.y.e", "slide.sum.z.e", "rod.length.e", "rail"].map(String::from).to_vec();
+        let run = Run { to: 0.1, every: Some(0.1), record: Record::Names(names), ..Run::default() };
+        let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
+        // The multiplier of |d|² pulls with twice itself times the length, 50/3 N.
+        let rail = 2.0 * 9.81 - 40.0 / 3.0;
+        for (column, expected) in trace.columns.iter().zip([0.0, 0.0, rail, -5.0 / 3.0, 2.0 * rail]) {
+            let off = column.values.iter().fold(0.0f64, |most, v| most.max((v - expected).abs()));
+            assert!(off < 1e-13, "{}: {:?} instead of {expected}", column.name, column.values);
+        }
     }
 }

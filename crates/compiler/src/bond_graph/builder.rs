@@ -189,6 +189,8 @@ pub(super) struct Builder<'a, 'f> {
     pub reactions: Vec<Pair>,
     /// Displacements that drawn zero compliances hold at zero.
     pub held_displacements: Vec<HeldDisplacement>,
+    /// What sources carry, by their parts.
+    pub carried: BTreeMap<usize, Expr>,
     /// Dimensions of the moduli of two-ports.
     pub moduli: BTreeMap<usize, Quantity>,
     /// Stored quantities of every port of every part.
@@ -254,6 +256,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             beyond: BTreeMap::new(),
             reactions: Vec::new(),
             held_displacements: Vec::new(),
+            carried: BTreeMap::new(),
             stored: Vec::with_capacity(flat.parts.len()),
             values: vec![None; flat.names.decls.len()],
             shapes: FxHashMap::default(),

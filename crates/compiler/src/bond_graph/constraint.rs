@@ -94,6 +94,7 @@ impl<'a> Builder<'a, '_> {
         kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut |e| visit(&self.exprs, *e)));
         sides.iter().for_each(|side| visit(&self.exprs, side.expr));
         self.held_displacements.iter().for_each(|held| visit(&self.exprs, held.expr));
+        self.carried.values().for_each(|&e| visit(&self.exprs, e));
         let displacement =
             |s: Symbol| matches!(self.role(s), Some(Role::Known(Meaning::Signal(_) | Meaning::Stored(_))));
         let idle: BTreeSet<Symbol> =
@@ -104,6 +105,7 @@ impl<'a> Builder<'a, '_> {
         kinds.iter_mut().flatten().for_each(|kind| kind.for_each_expr(&mut put));
         sides.iter_mut().for_each(|side| put(&mut side.expr));
         self.held_displacements.iter_mut().for_each(|held| put(&mut held.expr));
+        self.carried.values_mut().for_each(put);
     }
 
     /// The coefficient of restitution of an inequality, 0 if none is given. The outer `None`: at fault.

@@ -55,7 +55,7 @@ impl<'a> Builder<'a, '_> {
         let p = self.part(part);
         match p.word {
             Word::Zero | Word::One | Word::De | Word::Df => self.plain(part),
-            Word::Se => self.only_value(part, "e", true).map(|value| Kind::EffortSource { value }),
+            Word::Se => self.effort_source(part),
             Word::Sf => self.only_value(part, "f", true).map(|value| Kind::FlowSource { value }),
             Word::Zc => self.zero_compliance(part),
             Word::ResidualSe => self.residual(part).map(|residual| Kind::ResidualEffort { residual }),
@@ -80,7 +80,8 @@ impl<'a> Builder<'a, '_> {
     /// The law of a part as written, for drawings.
     pub fn label(&self, part: usize) -> String {
         let p = self.part(part);
-        let args = p.ast.args.iter().filter(|a| !a.label.as_ref().is_some_and(|l| is_start(&l.name.text)));
+        let beside = |a: &&Arg| a.label.as_ref().is_some_and(|l| is_start(&l.name.text)) || is_carried(a);
+        let args = p.ast.args.iter().filter(|a| !beside(a));
         args.map(|a| self.sources.slice(a.span)).collect::<Vec<_>>().join(", ")
     }
 
@@ -136,6 +137,9 @@ impl<'a> Builder<'a, '_> {
         let mut found: Option<&'a Arg> = None;
         let mut failed = false;
         for arg in &p.ast.args {
+            if p.word == Word::Se && is_carried(arg) {
+                continue;
+            }
             let fits = arg.label.as_ref().is_none_or(|l| l.port.is_none() && names.contains(&l.name.text.as_str()));
             if !fits {
                 self.unknown_label(p, arg.label.as_ref(), names);
@@ -188,6 +192,35 @@ impl<'a> Builder<'a, '_> {
         let quantity = if gives == "e" { &self.pairs[wire].effort_in } else { &self.pairs[wire].flow_in };
         self.equal_by_law(&value.quantity, &quantity.clone(), part);
         Some(value.expr)
+    }
+
+    /// A source of effort, and what it carries beside.
+    fn effort_source(&mut self, part: usize) -> Option<Kind> {
+        let value = self.only_value(part, "e", true)?;
+        let mut carried = self.part(part).ast.args.iter().filter(|arg| is_carried(arg));
+        if let Some(arg) = carried.next() {
+            if let Some(second) = carried.next() {
+                let title = format!("{} carries one effort", what(self.part(part)));
+                let d = Diagnostic::error(codes::N007, title, second.span, "one too many").also(arg.span, "the first");
+                self.fault(d.hint("add them, `carries = a + b`"));
+                return None;
+            }
+            let effort = self.arg(part, &arg.value, false)?;
+            let wire = self.wire_at(part, 0)?;
+            let quantity = self.pairs[wire].effort_in.clone();
+            self.equal_by_law(&effort.quantity, &quantity, part);
+            let multipliers: Vec<Symbol> = self.reactions.iter().map(|r| r.effort).collect();
+            if !self.exprs.linear_in(effort.expr, &multipliers).is_some_and(|(_, rest)| self.exprs.is_zero(rest)) {
+                let title = format!("what {} carries is no share of a constraint", what(self.part(part)));
+                let d = Diagnostic::error(codes::N007, title, arg.value.span, "it is told beside the equations");
+                let hint = "write a sum of multipliers with their factors, as in `carries = 2*pin.e`; an effort that acts is \
+                            the value of the source";
+                self.fault(d.hint(hint));
+                return None;
+            }
+            self.carried.insert(part, effort.expr);
+        }
+        Some(Kind::EffortSource { value })
     }
 
     /// A zero compliance: what its flow is held at, or the displacement that it holds at zero, whose rate its flow is.
@@ -1032,6 +1065,11 @@ fn what(p: &Part<'_>) -> String {
 
 fn variable(letter: &str) -> &'static str {
     if letter == "e" { "effort" } else { "flow" }
+}
+
+/// Whether an argument says what a source carries beside its own effort.
+fn is_carried(arg: &Arg) -> bool {
+    arg.label.as_ref().is_some_and(|l| l.port.is_none() && l.name.text == "carries")
 }
 
 /// Whether a label is one of the start values.

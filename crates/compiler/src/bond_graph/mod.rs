@@ -247,6 +247,9 @@ pub struct Element {
     pub component: Arc<str>,
     /// Which of how many it is, counted from 0, if it is one of the junctions, sources or sensors of a multibond.
     pub strand: Option<(u32, u32)>,
+    /// At a source of effort: the effort that acts there by a constraint that is solved at the rates (`carries`). It moves
+    /// nothing, and is told in the efforts of the bonds that bear it.
+    pub carries: Option<Expr>,
 }
 
 impl Element {

@@ -82,7 +82,10 @@ impl BondGraph {
         let flow = |port: usize| self.bonds[e.ports[port].bond].flow;
         match &e.kind {
             Kind::Zero | Kind::One | Kind::EffortDetector | Kind::FlowDetector => Vec::new(),
-            Kind::EffortSource { value } => vec![self.law(effort(0), *value)],
+            Kind::EffortSource { value } => {
+                let carries = e.carries.map(|carried| format!("carries {}", self.text(carried)));
+                std::iter::once(self.law(effort(0), *value)).chain(carries).collect()
+            }
             Kind::FlowSource { value } | Kind::ZeroCompliance { flow: value } => vec![self.law(flow(0), *value)],
             Kind::ResidualEffort { residual } => {
                 let own = self.exprs.name(flow(0)).to_string();

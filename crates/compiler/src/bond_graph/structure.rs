@@ -57,7 +57,8 @@ impl<'a> Builder<'a, '_> {
         };
         let component = self.flat.names.scopes[p.here.scope].instance.map_or("", |(component, _)| &component.name.text);
         let component = texts.components.entry(component).or_insert_with(|| component.into()).clone();
-        Element { name, kind, ports, span: p.ast.span, label, cell, component, strand }
+        let carries = self.carried.get(&part).copied();
+        Element { name, kind, ports, span: p.ast.span, label, cell, component, strand, carries }
     }
 
     fn bond(&self, wire: usize, w: &Wire) -> Bond {
@@ -85,6 +86,7 @@ impl Structure {
             cell: None,
             component: "".into(),
             strand: None,
+            carries: None,
         })
     }
 

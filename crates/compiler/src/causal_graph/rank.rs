@@ -186,6 +186,7 @@ fn detect(graph: &mut BondGraph, symbol: Symbol) -> Option<PortRef> {
         cell: None,
         component: "".into(),
         strand: None,
+        carries: None,
     };
     let (inner, outer) = match effort {
         true => (Kind::Zero, Kind::EffortDetector),

@@ -18,7 +18,7 @@ use super::stiff::parameters;
 use super::verify::verify;
 use super::{
     Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Position, Relations, State, StateKind,
-    Unavailable, conserved, domains, expansion, index, observed, relations,
+    Unavailable, carried, conserved, domains, expansion, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
@@ -180,6 +180,7 @@ fn order_equations(
     };
     let Assembled { mut d, states, rows, balances, .. } = assembled;
     drop((rows, balances));
+    let shares = carried::define(&mut d, truth);
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {
@@ -242,7 +243,7 @@ fn order_equations(
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, form, jumps.as_ref())?;
-    let observed = observed::observed(&mut d, &states, &positions);
+    let observed = observed::observed(&mut d, &states, &positions, &shares);
     // The other forms start as the minimal one does.
     let own_start = form.is_explicit();
     let mut conditions = if own_start { observed::conditions(&mut d, &positions) } else { Vec::new() };

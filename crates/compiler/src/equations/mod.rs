@@ -4,6 +4,7 @@ mod along;
 mod assumptions;
 mod blocks;
 mod breaks;
+mod carried;
 mod conserved;
 mod definitions;
 mod derive;
@@ -53,6 +54,7 @@ pub(crate) use expansion::{CLOSED, expansions, named_sources, put_in};
 pub use form::Form;
 pub use jumps::{Impulse, Jumps};
 pub use momenta::Momentum;
+pub use observed::bare_name;
 pub use position_relations::{PositionRelation, Unkept, UnkeptRelation};
 pub use relations::{Moved, Relations};
 pub use verify::verify;
@@ -336,6 +338,8 @@ pub struct Observed {
 pub enum ObservedKind {
     /// An effort: of a bond, or that of a constraint.
     Effort,
+    /// An effort without what a constraint at the rates puts on it: by these the junctions balance.
+    Bare,
     /// A flow.
     Flow,
     /// What an inertance stores.

@@ -1,7 +1,7 @@
 //! What can be recorded, and what the start has to satisfy.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::hash::BuildHasher;
 
 use hashbrown::HashTable;
@@ -21,8 +21,25 @@ pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> Str
 }
 
 /// Every variable that can be recorded, states, computed positions and outputs first.
-pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -> Vec<Observed> {
+///
+/// Efforts with a share in what a constraint at the rates carries, by `shares`, are told with it; what efforts are without it
+/// comes last, of all of them: which have a share may depend on what is independent.
+pub fn observed(
+    d: &mut Definitions,
+    states: &[State],
+    positions: &[Position],
+    shares: &BTreeMap<Symbol, Symbol>,
+) -> Vec<Observed> {
     let graph = d.graph;
+    let mut whole: BTreeMap<Symbol, Expr> = BTreeMap::new();
+    // A multiplier is told as it is: in the bonds of the loop it stands for what acts at the rates.
+    let multipliers: BTreeSet<Symbol> = graph.constraints.iter().flat_map(|c| d.x.symbols_of(c.multiplier)).collect();
+    for (&symbol, &share) in shares {
+        if matches!(d.meaning(symbol), Some(Meaning::Effort(_))) && !multipliers.contains(&symbol) {
+            let terms = [symbol, share].map(|s| d.x.sym(s));
+            whole.insert(symbol, d.x.add(&terms));
+        }
+    }
     let mut count = states.len() + positions.len();
     variables(graph, &mut |_, _, _| count += 1);
     let mut all: Vec<Observed> = Vec::with_capacity(count);
@@ -49,7 +66,8 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
     }
     for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
         for named in list {
-            let value = value_of(d, named.value);
+            let named_value = if whole.is_empty() { named.value } else { d.x.substitute(named.value, &whole) };
+            let value = value_of(d, named_value);
             add(&named.name, value, named.unit.clone(), ObservedKind::Named, default);
         }
     }
@@ -64,7 +82,7 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
         }
     }
     variables(graph, &mut |name, kind, symbol| {
-        let e = d.x.sym(symbol);
+        let e = whole.get(&symbol).copied().unwrap_or_else(|| d.x.sym(symbol));
         let value = value_of(d, e);
         let unit: Option<Unit> = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
         add(name, value, unit, kind, false);
@@ -87,7 +105,21 @@ pub fn observed(d: &mut Definitions, states: &[State], positions: &[Position]) -
         let value = value_of(d, named.value);
         add(&named.name, value, named.unit.clone(), ObservedKind::Named, false);
     }
+    if graph.elements.values().any(|e| e.carries.is_some()) {
+        variables(graph, &mut |name, kind, symbol| {
+            if kind == ObservedKind::Effort {
+                let e = d.x.sym(symbol);
+                let unit = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
+                add(&bare_name(name), value_of(d, e), unit, ObservedKind::Bare, false);
+            }
+        });
+    }
     all
+}
+
+/// The name of an effort without what a constraint at the rates puts on it.
+pub fn bare_name(name: &str) -> String {
+    format!("{name}.bare")
 }
 
 /// What a state is.

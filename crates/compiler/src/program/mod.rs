@@ -59,7 +59,9 @@ use std::sync::Arc;
 pub use crate::algebra::Holds;
 use crate::algebra::{Symbol, Table1d};
 use crate::bond_graph::{HeldKind, ParameterKind};
-pub use crate::equations::{DomainKind, Exchanged, Exchanges, ObservedKind, Unavailable, Unkept, UnkeptRelation};
+pub use crate::equations::{
+    DomainKind, Exchanged, Exchanges, ObservedKind, Unavailable, Unkept, UnkeptRelation, bare_name,
+};
 use crate::ids::{Table, id};
 use crate::span::Span;
 use crate::sparse::{SparseMatrix, SymbolicFactors};

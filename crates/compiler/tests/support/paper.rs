@@ -177,6 +177,7 @@ impl Builder<'_> {
                 cell: None,
                 component: "".into(),
                 strand: None,
+                carries: None,
             });
         }
     }

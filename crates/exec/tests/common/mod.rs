@@ -101,6 +101,7 @@ impl Sketch {
             cell: None,
             component: "".into(),
             strand: None,
+            carries: None,
         })
     }
     /// A state, recorded by default; its rate is given by [`rate`](Sketch::rate).

@@ -189,7 +189,10 @@ impl Subject<'_> {
             Ready::Explicit(system, _) => system.program(),
             Ready::Implicit(system, ..) => system.program(),
         };
-        let known = program.observed.iter().filter(|o| o.value.is_ok() && o.kind != ObservedKind::Drift);
+        let known = program
+            .observed
+            .iter()
+            .filter(|o| o.value.is_ok() && !matches!(o.kind, ObservedKind::Drift | ObservedKind::Bare));
         let unit = |o: &Observed| o.unit.as_ref().map(|u| u.to_string()).unwrap_or_default();
         known.map(|o| Variable { name: o.name.to_string(), unit: unit(o), kind: o.kind }).collect()
     }

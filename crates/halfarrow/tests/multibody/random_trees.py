@@ -1393,28 +1393,6 @@ START = {"position": 1e-11, "velocity": 1e-10, "acceleration": 1e-9, "reaction":
 END = {"position": 1e-8, "velocity": 1e-8, "acceleration": 1e-7, "reaction": 1e-7}
 
 
-def in_loops(machine):
-    """Joints on the way between the two ends of a loop: their bonds do not carry what the cut carries, see docs/TESTING.md."""
-    carried = {joint.b: joint for joint in machine.joints}
-    carried.update({k: link.weld for k, link in enumerate(machine.links) if link.weld is not None})
-
-    def way(link):
-        found = []
-        while link != GROUND:
-            thing = carried[link]
-            if isinstance(thing, Joint):
-                found.append(thing.name)
-                link = thing.a.link
-            else:
-                link = thing.link
-        return found
-
-    found = set()
-    for loop in machine.loops:
-        found |= set(way(loop.a.link)) ^ set(way(loop.b.link))
-    return found
-
-
 def scales(machine, solved):
     """The greatest of each class in the machine, at least 1."""
     found = {"position": 1.0, "velocity": 1.0, "acceleration": 1.0, "reaction": 1.0}
@@ -1431,10 +1409,10 @@ def scales(machine, solved):
 
 def compare(machine, solved, row, record):
     """The greatest difference of each class, in its scale, and where."""
-    scale, worst, inside = scales(machine, solved), {}, in_loops(machine)
+    scale, worst = scales(machine, solved), {}
     for key, names in record.items():
         values = expected(machine, solved, key)
-        if values is None or key[0] in inside:
+        if values is None:
             continue
         kind = CLASS[key[1]]
         for i, name in enumerate(names):
@@ -1619,10 +1597,10 @@ def references(arguments):
 
 
 def reference(machine, variant, text, record, start, end):
-    columns, inside = [], in_loops(machine)
+    columns = []
     for key, names in record.items():
         values = [expected(machine, solved, key) for solved in (start, end)]
-        if key[1] != "R" and key[0] not in inside and values[0] is not None:
+        if key[1] != "R" and values[0] is not None:
             columns += [(name, CLASS[key[1]], *(float(f"{v[i]:.16g}") for v in values)) for i, name in enumerate(names)]
     lines = [line for line in text.split("\n") if not line.startswith("output R")]
     return {
