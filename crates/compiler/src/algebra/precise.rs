@@ -164,13 +164,8 @@ pub(super) struct Point<'a> {
 }
 
 impl Point<'_> {
-    /// Whether the expression is zero at this point.
-    pub fn verdict<R: Real>(&self, e: Expr, constants: &mut Consts) -> Verdict {
-        self.verdict_by(e, &mut Values::<R>::default(), constants)
-    }
-
-    /// The same, with values at this point that are known already, and those that are found.
-    pub fn verdict_by<R: Real>(&self, e: Expr, values: &mut Values<R>, constants: &mut Consts) -> Verdict {
+    /// Whether the expression is zero at this point; with values that are known of it already, and those that are found.
+    pub fn verdict<R: Real>(&self, e: Expr, values: &mut Values<R>, constants: &mut Consts) -> Verdict {
         let Some(result) = self.value::<R>(e, values, constants) else { return Verdict::Unknown };
         if result.value.size() > result.error + 2.0 {
             return Verdict::Nonzero;

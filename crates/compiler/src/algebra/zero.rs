@@ -14,8 +14,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const POINTS: usize = 12;
 /// Points that are tried for that: at some of them the expression may be undefined.
 const TRIED: u64 = 48;
-/// Values that are kept of the first point.
-const KEPT_AT_MOST: usize = 1 << 22;
+/// Values that are kept.
+const ROUGH_AT_MOST: usize = 1 << 22;
+const EXACT_AT_MOST: usize = 1 << 18;
 
 /// What values at random points have told: it stays true, since a pool never changes what it has.
 #[derive(Debug, Default)]
@@ -26,9 +27,27 @@ pub(super) struct Told {
     given: Mutex<FxHashMap<Symbol, f64>>,
     /// Functions of many digits at the points: most of what a value costs.
     calls: Mutex<Calls>,
-    /// Values of few digits at the first point, in general and at the given parameters: most expressions that are not zero
-    /// show it there, and long ones have their parts in common.
-    first: Mutex<[Values<f64>; 2]>,
+    /// Values at the points: long expressions have their parts in common.
+    at: Mutex<AtPoints>,
+}
+
+/// Values of few digits and of many by point, in general and at the given parameters.
+#[derive(Debug, Default)]
+struct AtPoints {
+    rough: FxHashMap<(u64, bool), Values<f64>>,
+    exact: FxHashMap<(u64, bool), Values<BigFloat>>,
+}
+
+impl AtPoints {
+    /// Makes room where there are too many.
+    fn bound(&mut self) {
+        if self.rough.values().map(Values::len).sum::<usize>() > ROUGH_AT_MOST {
+            self.rough.clear();
+        }
+        if self.exact.values().map(Values::len).sum::<usize>() > EXACT_AT_MOST {
+            self.exact.clear();
+        }
+    }
 }
 
 impl Clone for Told {
@@ -43,8 +62,8 @@ impl Told {
         self.calls.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn first(&self) -> MutexGuard<'_, [Values<f64>; 2]> {
-        self.first.lock().unwrap_or_else(PoisonError::into_inner)
+    fn at(&self) -> MutexGuard<'_, AtPoints> {
+        self.at.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn given(&self) -> MutexGuard<'_, FxHashMap<Symbol, f64>> {
@@ -134,20 +153,14 @@ impl Exprs {
         let mut zeros = 0;
         for number in 0..TRIED {
             let point = Point { pool: self, number, given };
-            let roughly = match number {
-                0 => {
-                    let known = &mut self.told.first()[usize::from(given)];
-                    if known.len() > KEPT_AT_MOST {
-                        known.clear();
-                    }
-                    point.verdict_by::<f64>(e, known, &mut constants)
-                }
-                _ => point.verdict::<f64>(e, &mut constants),
-            };
-            if roughly == Verdict::Nonzero {
+            let mut known = self.told.at();
+            known.bound();
+            let rough = known.rough.entry((number, given)).or_default();
+            if point.verdict::<f64>(e, rough, &mut constants) == Verdict::Nonzero {
                 return false;
             }
-            match point.verdict::<BigFloat>(e, &mut constants) {
+            let exact = known.exact.entry((number, given)).or_default();
+            match point.verdict::<BigFloat>(e, exact, &mut constants) {
                 Verdict::Nonzero => return false,
                 Verdict::Zero => zeros += 1,
                 Verdict::Unknown => {}

@@ -1,8 +1,10 @@
 //! From drawn bonds to bonds between ports of elements: ports of components vanish, every port gets its bond.
 
-use super::faults::Faults;
+use std::collections::BTreeSet;
+
 use smallvec::{SmallVec, smallvec};
 
+use super::faults::Faults;
 use super::flatten::{At, End, Flat, Part, Word};
 use super::multibonds::Width;
 use super::scope::{Here, Names};
@@ -94,6 +96,8 @@ impl Wiring {
     /// What is at both sides of every joint.
     fn sides(&mut self, flat: &Flat<'_>) -> Vec<Sides> {
         let mut sides = vec![Sides::default(); flat.joints.len()];
+        // Where the strands of one port are crowded that is said once.
+        let mut told: BTreeSet<(usize, Span)> = BTreeSet::new();
         for (i, drawn) in flat.drawn.iter().enumerate() {
             for (end, starts) in [(drawn.from, true), (drawn.to, false)] {
                 let (joint, outside) = match end.at {
@@ -106,9 +110,11 @@ impl Wiring {
                     None => *side = Some((i, starts)),
                     Some((first, _)) => {
                         sides[joint].broken = true;
-                        let before = self.faults.len();
-                        self.crowded(flat, joint, end, flat.drawn[first].span, outside);
-                        self.met_in(flat, drawn.here, before);
+                        if told.insert((flat.joints[joint].instance, end.span)) {
+                            let before = self.faults.len();
+                            self.crowded(flat, joint, end, flat.drawn[first].span, outside);
+                            self.met_in(flat, drawn.here, before);
+                        }
                     }
                 }
             }
@@ -123,13 +129,24 @@ impl Wiring {
 
     /// Two bonds at one side of a port of a component.
     fn crowded(&mut self, flat: &Flat<'_>, joint: usize, end: End, first: Span, outside: bool) {
-        let name = &flat.joints[joint].name;
-        let place = if outside { "from outside" } else { "in the component" };
+        let port = &flat.joints[joint];
+        let (own, strand) = match port.name.find(['.', '[']) {
+            Some(end) => port.name.split_at(end),
+            None => (port.name.as_str(), ""),
+        };
+        let title = match outside {
+            true => format!("two bonds at port `{}{own}` from outside", flat.names.scopes[port.instance].prefix),
+            false => format!("two bonds at port `{own}` in the component"),
+        };
+        let hint = match strand.starts_with('.') {
+            true => "join them with a junction as wide as the port, `1[frame]:hub` for a frame, and that with the port",
+            false => "join them with a 0- or 1-junction, and the junction with the port",
+        };
         self.fault(
-            Diagnostic::error(codes::B002, format!("two bonds at port `{name}` {place}"), end.span, "the second bond")
+            Diagnostic::error(codes::B002, title, end.span, "the second bond")
                 .also(first, "the first bond")
                 .note("a port takes one bond")
-                .hint("join them with a 0- or 1-junction, and the junction with the port"),
+                .hint(hint),
         );
     }
 
