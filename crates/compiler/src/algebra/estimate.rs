@@ -2,6 +2,7 @@
 //! tell what roots and functions are.
 
 use super::elimination::{Coefficients, NumericPoint, Quality, Zero};
+use super::math;
 
 /// What an evaluation leaves of the digits of a value.
 const EVALUATED: f64 = 1e-12;
@@ -31,7 +32,7 @@ impl Bounded {
     /// How many digits are lost, in steps of two or three: what is divided by passes them on to all that follows.
     fn doubt(self) -> u32 {
         let lost = (self.error / self.value).abs() / EVALUATED;
-        if lost > 1.0 { (lost.log2() / STEP_OF_DOUBT) as u32 } else { 0 }
+        if lost > 1.0 { (math::log2(lost) / STEP_OF_DOUBT) as u32 } else { 0 }
     }
     fn vanishes(self) -> bool {
         // What has no value is no pivot.

@@ -53,7 +53,7 @@ pub fn define(d: &mut Definitions, truth: &CausalGraph) -> BTreeMap<Symbol, Symb
 /// A variable for the share in another one.
 fn share(d: &mut Definitions, of: Symbol, value: Expr) -> Symbol {
     let name = format!("{}.carried", d.x.label(of));
-    let share = d.x.fresh(&name, d.x.facts(of).clone());
+    let share = d.x.fresh(&name, Default::default());
     d.set(share, value);
     share
 }
