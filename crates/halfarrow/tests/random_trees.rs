@@ -155,3 +155,19 @@ fn joints_carry_what_closes_their_loop() {
         }
     }
 }
+
+/// What a source carries may read a signal that repeats what a storage keeps.
+#[test]
+fn what_is_carried_reads_what_a_spring_keeps() {
+    let text = "model M\nSe:push(1) -> 1:va -> I:a(1)\nva -> C:spring(k = 3, q0 = 0.1)\n1:vb -> I:b(1)\n\
+                state x' = va.f from 0.1\nstate y' = vb.f from 0.05\nconstraint pin: x = 2*y\n\
+                va -> Se:end(0, carries = 2*x*pin.e)\n";
+    let model = Model::from_text("carried.bond", text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let names = ["end.e", "pin.e", "x"].map(String::from).to_vec();
+    let run = Run { to: 1.0, every: Some(0.1), record: Record::Names(names), ..Run::default() };
+    let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
+    let [end, pin, x] = &trace.columns[..] else { panic!("three columns") };
+    for ((end, pin), x) in end.values.iter().zip(&pin.values).zip(&x.values) {
+        assert!(*pin != 0.0 && (end - 2.0 * x * pin).abs() < 1e-15, "{end} instead of 2 * {x} * {pin}");
+    }
+}

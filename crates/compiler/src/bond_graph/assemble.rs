@@ -74,7 +74,10 @@ struct Tables<'t> {
 impl Laws {
     /// Visits every expression, always in the same order, those of guesses last.
     fn for_each_expr(&mut self, guesses: &mut [Guess], visit: &mut dyn FnMut(&mut Expr)) {
-        self.structure.elements.iter_mut().for_each(|(_, element)| element.kind.for_each_expr(visit));
+        for (_, element) in self.structure.elements.iter_mut() {
+            element.kind.for_each_expr(visit);
+            element.carries.iter_mut().for_each(&mut *visit);
+        }
         for (_, signal) in self.signals.iter_mut() {
             visit(&mut signal.rate);
             signal.initial.iter_mut().for_each(&mut *visit);

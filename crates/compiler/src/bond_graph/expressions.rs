@@ -11,7 +11,8 @@ impl BondGraph {
 
     /// The expressions of laws, signals, named values, constraints and guesses.
     pub(super) fn expressions(&self) -> Vec<Expr> {
-        let mut all: Vec<Expr> = self.elements.values().flat_map(|e| e.kind.expressions()).collect();
+        let mut all: Vec<Expr> =
+            self.elements.values().flat_map(|e| e.kind.expressions().into_iter().chain(e.carries)).collect();
         all.extend(self.signals.values().flat_map(|s| std::iter::once(s.rate).chain(s.initial)));
         all.extend(self.held.values().map(|h| h.source));
         all.extend(self.clauses.iter().flat_map(Clause::expressions));
