@@ -98,7 +98,8 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
     match elaborated.graph {
         Some(ir) if !found.diagnostics.has_errors() => {
             found.diagnostics.0.extend(told_once(bond_graph::warnings(&ir), &ir));
-            Ok(Reached { ir: causal_graph::in_first_mode(ir), found })
+            let ir = causal_graph::reading_shares(causal_graph::in_first_mode(ir));
+            Ok(Reached { ir, found })
         }
         _ => Err(found),
     }

@@ -171,3 +171,62 @@ fn what_is_carried_reads_what_a_spring_keeps() {
         assert!(*pin != 0.0 && (end - 2.0 * x * pin).abs() < 1e-15, "{end} instead of 2 * {x} * {pin}");
     }
 }
+
+/// Friction by the load of a guide reads the load with what closes the loop, whether its bonds are drawn or it acts at the
+/// rates; so do friction that is set-valued and events.
+#[test]
+fn laws_read_what_closes_their_loop() {
+    let text = |through: usize, law: &str| {
+        format!(
+            "model Crank\nimport std.planar\nSe:motor(2) -> drive.axis\n\
+             PlanarWorld:world -> 1[plane]:ground -> PlanarRevolute:drive(q0 = 0.9, fixed = 1) -> 1[plane]:crank\n\
+             crank -> PlanarBody:disc(m = 1, J = 0.02)\n\
+             crank -> PlanarTranslation:throw(d = [0.1, 0]) -> PlanarRevolute:pin(q0 = -1.2) -> 1[plane]:rod\n\
+             rod -> PlanarBody:bar(m = 0.4, J = 0.003, c = [0.15, 0])\nrod -> PlanarTranslation:length(d = [0.3, 0])\n\
+             ground -> PlanarPrismatic:slide(q0 = 0.35) -> 1[plane]:slider -> PlanarBody:piston(m = 0.5, J = 0.001)\n\
+             PlanarCutRevolute:wrist(through = {through})\nlength -> wrist.a\nslider -> wrist.b\n\
+             Se:zero(0) -> 1:glide -> slide.axis\nglide -> R:rub({law})\n\
+             discrete n = 0\nwhen slide.sum_y.e < 2 {{ n = n + 1 }}\nstate push' = slide.sum_y.e from 0\n"
+        )
+    };
+    for law in [
+        "e = 0.2*abs(slide.sum_y.e)*tanh(f/(0.01 m/s))",
+        "friction = 0.2*abs(slide.sum_y.e)",
+        "e = (1 N + slide.sum_y.e)*(f/(1 m/s))",
+    ] {
+        let ends = [0, 1].map(|through| {
+            let text = text(through, law);
+            let model = Model::from_text("crank.bond", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+            let names = ["drive.rate.f", "rub.e", "slide.sum_y.e", "n", "push"].map(String::from).to_vec();
+            let run = Run { to: 0.5, every: Some(0.05), rtol: 1e-10, record: Record::Names(names), ..Run::default() };
+            let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
+            trace.columns.into_iter().map(|c| c.values).collect::<Vec<_>>()
+        });
+        let [rates, drawn] = ends;
+        assert!(*drawn[3].last().expect("a row") >= 2.0, "{law}: the event is met");
+        for (at, (a, b)) in rates.iter().zip(&drawn).enumerate() {
+            let size = b.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+            let off = a.iter().zip(b).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(off < 1e-7 * size, "{law}, column {at}: {off:e} of {size}");
+        }
+    }
+}
+
+/// A cart that a plane holds puts no load on the slide that it moves along: friction by that load takes nothing from it.
+#[test]
+fn what_a_plane_holds_loads_no_slide() {
+    let text = "model Cart\nimport std.multibody\n\
+        World:world -> 1[frame]:ground -> Prismatic:slide(n = [1, 0, 0], v0 = 1) -> 1[frame]:mid\n\
+        mid -> Prismatic:lift(n = [0, 0, 1]) -> 1[frame]:cart -> Body:b(m = 2, J = diag([1, 1, 1]))\n\
+        CutInplane:plane(n = [0, 0, 1])\nground -> plane.a\ncart -> plane.b\n\
+        Se:push(0) -> 1:glide -> slide.axis\nglide -> R:rub(e = 0.3*(5 + abs(slide.sum.z.e))*tanh(f/(0.01 m/s)))\n";
+    let model = Model::from_text("cart.bond", text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let names = ["slide.rate.f", "slide.sum.z.e", "plane.above.e"].map(String::from).to_vec();
+    let run = Run { to: 0.5, every: Some(0.5), record: Record::Names(names), ..Run::default() };
+    let trace = model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{error}")).trace;
+    // The speed falls by 1.5 N / 2 kg.
+    for (column, expected) in trace.columns.iter().zip([1.0 - 0.75 * 0.5, 0.0, 2.0 * 9.81]) {
+        let end = column.values[1];
+        assert!((end - expected).abs() < 1e-6, "{}: {end} instead of {expected}", column.name);
+    }
+}

@@ -1,7 +1,7 @@
 //! The expressions of a graph, visited always in the same order.
 
-use super::{BondGraph, Clause, Kind, ResistorLaw, SetValuedLaw, Shape, Storage, StorageLaw, Trigger};
-use crate::algebra::Expr;
+use super::{BondGraph, Clause, ElementId, Kind, ResistorLaw, SetValuedLaw, Shape, Storage, StorageLaw, Trigger};
+use crate::algebra::{Expr, Exprs};
 
 impl BondGraph {
     /// Whether a ratio of the graph may leap: a modulus with a condition, a constraint with a corner.
@@ -22,6 +22,35 @@ impl BondGraph {
         all.extend(self.shapes.iter().flat_map(Shape::values).map(|n| n.value));
         all.extend(self.guesses.iter().flat_map(|g| [g.what, g.value]));
         all
+    }
+
+    /// What moves the model: the expressions of laws, each with its element, of signals and of events.
+    pub(crate) fn moved_by(&self) -> Vec<(Expr, Option<ElementId>)> {
+        let mut all = Vec::new();
+        self.clone().rewrite_laws(&mut |_, e, element| {
+            all.push((e, element));
+            e
+        });
+        all
+    }
+
+    /// Puts other expressions into the places of those that [move](BondGraph::moved_by) the model.
+    pub(crate) fn rewrite_laws(&mut self, rewrite: &mut dyn FnMut(&mut Exprs, Expr, Option<ElementId>) -> Expr) {
+        let x = &mut self.exprs;
+        for (id, element) in self.elements.iter_mut() {
+            element.kind.for_each_expr(&mut |e| *e = rewrite(x, *e, Some(id)));
+        }
+        for law in &mut self.set_valued {
+            let element = law.element;
+            law.for_each_expr(&mut |e| *e = rewrite(x, *e, Some(element)));
+        }
+        let mut others = |e: &mut Expr| *e = rewrite(x, *e, None);
+        for (_, signal) in self.signals.iter_mut() {
+            others(&mut signal.rate);
+            signal.initial.iter_mut().for_each(&mut others);
+        }
+        self.held.iter_mut().for_each(|(_, h)| others(&mut h.source));
+        self.clauses.iter_mut().for_each(|c| c.for_each_expr(&mut others));
     }
 }
 

@@ -6,6 +6,7 @@
 mod assign;
 pub mod break_set;
 mod by_size;
+mod carried;
 mod contradiction;
 mod digits;
 mod drawn;
@@ -34,6 +35,7 @@ use crate::bond_graph::{BondGraph, BondId, PortCausality, PortRef};
 use crate::ids::{Map, Table};
 
 pub use assign::assign_causality;
+pub use carried::{reading_shares, shares};
 pub use contradiction::warnings;
 pub(crate) use digits::magnitude_of_slope;
 pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};

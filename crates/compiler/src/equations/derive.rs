@@ -1,6 +1,6 @@
 //! The stage: from a causal graph to equations in evaluation order.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::along::{AlgebraicConstraint, Treatment, assemble_all};
 use super::assumptions::assumptions;
@@ -18,11 +18,11 @@ use super::stiff::parameters;
 use super::verify::verify;
 use super::{
     Algebraic, BreakBound, Conserved, EquationStep, Equations, Form, Position, Relations, State, StateKind,
-    Unavailable, carried, conserved, domains, expansion, index, observed, relations,
+    Unavailable, conserved, domains, expansion, index, observed, relations,
 };
 use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortRef};
-use crate::causal_graph::{CausalGraph, Role, Stroke, as_drawn, resistors_first, without_constraints};
+use crate::causal_graph::{CausalGraph, Role, Stroke, as_drawn, resistors_first, shares, without_constraints};
 use crate::causal_paths::{certificate, eliminated_ports, invert};
 use crate::diagnostic::{Diagnostic, Diagnostics, codes};
 use crate::ids::{Map, Table};
@@ -180,7 +180,12 @@ fn order_equations(
     };
     let Assembled { mut d, states, rows, balances, .. } = assembled;
     drop((rows, balances));
-    let shares = carried::define(&mut d, truth);
+    let missing: BTreeSet<Symbol> = d.missing.keys().copied().collect();
+    let mut share_of = BTreeMap::new();
+    for share in shares(&mut d.x, truth, |s| missing.contains(&s)) {
+        d.set(share.symbol, share.value);
+        share_of.insert(share.of, share.symbol);
+    }
     d.spread_missing();
     let rates: BTreeSet<Symbol> = states.iter().map(|s| d.states[&s.symbol]).collect();
     for state in &states {
@@ -243,7 +248,7 @@ fn order_equations(
     // Forms with constraints left in them go by the minimal one at events.
     let jumps = jumps.filter(|_| residuals.is_empty());
     readable(&mut d, form, jumps.as_ref())?;
-    let observed = observed::observed(&mut d, &states, &positions, &shares);
+    let observed = observed::observed(&mut d, &states, &positions, &share_of);
     // The other forms start as the minimal one does.
     let own_start = form.is_explicit();
     let mut conditions = if own_start { observed::conditions(&mut d, &positions) } else { Vec::new() };

@@ -4,7 +4,6 @@ mod along;
 mod assumptions;
 mod blocks;
 mod breaks;
-mod carried;
 mod conserved;
 mod definitions;
 mod derive;
