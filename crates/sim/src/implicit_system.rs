@@ -44,6 +44,12 @@ pub trait ImplicitSystem {
     /// As [`residual`](ImplicitSystem::residual).
     fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure>;
 
+    /// What sort each unknown is of, one entry an unknown: those of one sort are told in the same unit, and what is rounding
+    /// beside the greatest of them says nothing. Empty where that is not known.
+    fn sorts(&self) -> Vec<usize> {
+        Vec::new()
+    }
+
     /// Index of an unknown: 1, 2 or 3.
     fn index(&self, unknown: usize) -> u8;
 

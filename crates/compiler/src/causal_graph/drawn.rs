@@ -8,7 +8,7 @@ use super::ports::{CausalityPreferences, Virtual, imposes_effort, solve_part_at_
 use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
 use super::strokes::{Strokes, parts};
-use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local};
+use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local, two_ports};
 use crate::algebra::{Assumptions, Symbol};
 use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortCausality, PortRef};
 use crate::ids::Table;
@@ -54,11 +54,20 @@ fn turns_sources(causal: &CausalGraph, members: &[ElementId], drawn: local::Draw
     })
 }
 
-/// Whether all bonds of an element are drawn, by the rules.
+/// Whether all bonds of an element are drawn, by the rules; each equation of a wide two-port gives a variable.
 fn is_drawn(graph: &BondGraph, kept: &BTreeSet<ElementId>, drawn: local::Drawn, element: ElementId) -> bool {
     let (here, away) = around(element, graph, drawn);
     let Element { kind, ports, .. } = &graph.elements[element];
-    here + away == ports.len() && in_order(kind, here, away, kept.contains(&element))
+    if here + away != ports.len() || !in_order(kind, here, away, kept.contains(&element)) {
+        return false;
+    }
+    let sets_effort = |port: usize| drawn(PortRef { element, port: port as u32 }).map(|here| !here);
+    match kind {
+        Kind::MatrixTransformer(_) | Kind::MatrixGyrator(_) => {
+            two_ports::given(&kind.two_port_rows(), &sets_effort).iter().all(Option::is_some)
+        }
+        _ => true,
+    }
 }
 
 /// The ports of some elements as elimination found them, with all definitions behind them.

@@ -32,6 +32,8 @@ use subject::{Common, Settings, Subject, Variable, is_over};
 const TIGHT: f64 = 1e-11;
 /// Powers of ten of the stiffness, the square of the ratio of frequencies.
 const STIFFNESSES: std::ops::RangeInclusive<i32> = 2..=12;
+/// Operations of the rates and their derivatives in a run that is as long as its fastest time, times how often that passes.
+const MOST_OPERATIONS: f64 = 1e8;
 /// Why a form has no times.
 const STOPS: &str = "its runs stop before their end";
 /// Parts of a budget at whose end the reference, all ladders and all times have to be there.
@@ -243,7 +245,9 @@ impl<'m> ComparedForms<'m> {
     /// # Errors
     /// The reference run stops.
     pub fn measured(mut self, progress: Progress) -> Result<CompareReport, Error> {
-        progress(0.02, "reference");
+        progress(0.02, "machine code");
+        self.subjects.iter_mut().flatten().for_each(Subject::compile);
+        progress(0.03, "reference");
         let minimal = self.subjects[0].as_ref().expect("without it there are no forms");
         let to = self.compare.to.unwrap_or_else(|| typical_time(minimal));
         self.run.to = to;
@@ -351,7 +355,8 @@ impl<'m> ComparedForms<'m> {
             }
             let stiffness = ten_to(power);
             let run = Run { form: Form::Stiff, stiffness: Some(stiffness), ..self.run.clone() };
-            let subject = self.common.subject(equations, &run)?;
+            let mut subject = self.common.subject(equations, &run)?;
+            subject.compile();
             let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to, until: effort.until };
             let Some(error) = error_of(&subject, reference, exact) else { continue };
             let mut rungs: Vec<Rung> = Vec::new();
@@ -605,11 +610,13 @@ fn motion(minimal: &Subject) -> Vec<String> {
     motion
 }
 
-/// Ten times the slowest time of the motion near the start, but at most a thousand times the fastest; 1 s if nothing
-/// moves. Rounded to 1, 2 or 5 times a power of ten.
+/// Ten times the slowest time of the motion near the start, but at most a thousand times the fastest, and no longer than runs of
+/// large models can be repeated; 1 s if nothing moves. Rounded to 1, 2 or 5 times a power of ten.
 fn typical_time(minimal: &Subject) -> f64 {
     let Some((slowest, fastest)) = minimal.rates() else { return 1.0 };
-    let time = (10.0 / slowest).min(1000.0 / fastest);
+    // Of the rates, and of their derivatives by each state.
+    let evaluated = minimal.operations().total() as f64 * (1 + minimal.states().len()) as f64;
+    let time = (10.0 / slowest).min(1000.0 / fastest).min(MOST_OPERATIONS / (evaluated * fastest));
     let power = libm::floor(libm::log10(time));
     let unit = ten_to(power as i32);
     let digit = [1.0, 2.0, 5.0, 10.0].into_iter().find(|d| d * unit >= 0.999 * time).unwrap_or(10.0);

@@ -158,6 +158,16 @@ impl<'m> Common<'m> {
 }
 
 impl Subject<'_> {
+    /// Makes machine code of what its runs evaluate, where there is any: the same bits, sooner.
+    pub(super) fn compile(&mut self) {
+        let made = match &mut self.system {
+            Ready::Explicit(system, _) => system.compile_machine().and_then(|()| system.compile_directional()),
+            Ready::Implicit(system, ..) => system.compile_machine(),
+        };
+        // Where there is none all forms run as bytecode.
+        let _ = made;
+    }
+
     /// The methods that can integrate it.
     pub(super) fn methods(&self) -> Vec<Method> {
         match &self.system {

@@ -35,10 +35,7 @@ impl Run<'_> {
                 Ok((end, false))
             }
             (_, Some((time, indicator))) => {
-                if self.chatter.is_one(time) {
-                    let what = stepper.events().indicator_name(indicator);
-                    return Err(Failure::Chattering { time, what });
-                }
+                self.notice(stepper, time, indicator)?;
                 stepper.accept_crossing(time, point);
                 Ok((time, true))
             }
@@ -81,11 +78,25 @@ impl Run<'_> {
         crossed(signs, end)?;
         signs.step_ended(end - *time);
         point.copy_from_slice(inside);
-        if let Some(indicator) = indicator.filter(|_| self.chatter.is_one(end)) {
-            let what = stepper.events().indicator_name(indicator);
-            return Err(Failure::Chattering { time: end, what });
+        if let Some(indicator) = indicator {
+            self.notice(stepper, end, indicator)?;
         }
         Ok((end, indicator.is_some()))
+    }
+
+    /// Takes notice of a zero crossing. What crosses zero again and again while time stands still may do so by rounding: it is
+    /// looked at more coarsely then, unless something happens where it does.
+    ///
+    /// # Errors
+    /// That was one too many.
+    fn notice<S: Stepper>(&mut self, stepper: &mut S, time: f64, indicator: usize) -> Result<(), Failure> {
+        if self.chatter.is_one(time) {
+            return Err(Failure::Chattering { time, what: stepper.events().indicator_name(indicator) });
+        }
+        if self.chatter.is_frequent() && !stepper.events().locates_crossings() {
+            self.signs.look_coarsely(indicator);
+        }
+        Ok(())
     }
 
     /// The first zero crossing in the step that ends at `end`, which it is, and where the step ends now: where its end is

@@ -19,6 +19,10 @@ use crate::events::{Chatter, Events, Signs};
 use crate::{Failure, Options};
 use recording::Samples;
 
+/// What is not told apart where signs are looked at coarsely: part of the tolerance of a state, and of its magnitude.
+const FINE: f64 = 1e-3;
+const ROUNDING: f64 = 2e-12;
+
 /// Why the driver looks up at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum StopReason {
@@ -252,7 +256,7 @@ impl<'a> Run<'a> {
         let exchanged = events.exchange_independent(self.time, point, failed)?;
         if exchanged {
             self.counts.exchanges += 1;
-            self.signs = Signs::new(events.indicators());
+            self.signs.renew(events.indicators());
             self.signs.take(events, self.time, point)?;
         }
         Ok(exchanged)
@@ -303,7 +307,7 @@ impl<'a> Run<'a> {
     fn handle(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
         events.handle_event(self.time, point)?;
         if self.signs.len() != events.indicators() {
-            self.signs = Signs::new(events.indicators());
+            self.signs.renew(events.indicators());
         }
         self.handled = true;
         self.show(events, point)?;
@@ -324,6 +328,8 @@ impl<'a> Run<'a> {
 
     /// Says how exact each state is kept.
     pub(crate) fn report_tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
+        let resolution = |(magnitude, absolute): (&f64, &f64)| (FINE * absolute).max(ROUNDING * magnitude);
+        self.signs.resolve(magnitudes.iter().zip(absolute).map(resolution));
         self.sink.tolerances(magnitudes, absolute);
     }
 

@@ -6,6 +6,9 @@ const MOST_CROSSINGS: usize = 200;
 /// Part of the run in which so many crossings have no physical meaning.
 const SHORT: f64 = 1e-9;
 
+/// Crossings in a row within it from which on the sign of what is asked for is looked at more coarsely.
+const FREQUENT: usize = 50;
+
 /// Part of the time that has passed in which so many time events have none: that of a few thousand rounding errors.
 const STILL: f64 = 1e-12;
 
@@ -36,6 +39,11 @@ impl Chatter {
         }
         self.crossings += 1;
         self.crossings > MOST_CROSSINGS
+    }
+
+    /// Whether the events noticed last follow each other so fast that more may be one too many.
+    pub(crate) fn is_frequent(&self) -> bool {
+        self.crossings >= FREQUENT
     }
 }
 

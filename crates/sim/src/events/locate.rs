@@ -35,6 +35,7 @@ pub(crate) fn first_crossing(
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
     let finest = FINEST * (end - start);
     let (thorough, mut looks) = (signs.thorough, 0);
+    signs.sharpen(None);
     crossed(signs, start)?;
     signs.keep(0);
     for part in 1..=PARTS {
@@ -118,11 +119,14 @@ fn bisect(
         if middle <= before || middle >= after || after - before <= finest {
             break;
         }
+        // That it is zero somewhere here is certain, and where is told to rounding.
+        signs.sharpen(found);
         match crossed(signs, middle)? {
             None => before = middle,
             there => (after, found) = (middle, there),
         }
     }
+    signs.sharpen(None);
     Ok(found.map(|indicator| (after, indicator)))
 }
 

@@ -26,13 +26,57 @@ pub(crate) struct Signs {
     pub(super) thorough: bool,
     /// How long the step before was, in s, if no event lies between.
     last: Option<f64>,
+    /// How exact the run keeps the entries of its point, as far as it is known, and which signs count only beyond what that
+    /// makes of their indicators.
+    resolution: Vec<f64>,
+    coarse: Vec<bool>,
+    /// The coarse one whose sign counts nevertheless.
+    sharp: Option<usize>,
 }
+
+/// Points within the resolution of the run at which a coarse indicator is looked at.
+const SHAKEN: usize = 3;
 
 impl Signs {
     pub(crate) fn new(indicators: usize) -> Signs {
         let values = vec![0.0; indicators];
         let (seen, most) = (vec![0.0; indicators * PLACES], values.clone());
-        Signs { held: vec![false; indicators], seen, most, values, thorough: false, last: None }
+        let coarse = vec![false; indicators];
+        Signs {
+            held: coarse.clone(),
+            seen,
+            most,
+            values,
+            thorough: false,
+            last: None,
+            resolution: Vec::new(),
+            coarse,
+            sharp: None,
+        }
+    }
+
+    /// For another number of indicators.
+    pub(crate) fn renew(&mut self, indicators: usize) {
+        let resolution = std::mem::take(&mut self.resolution);
+        *self = Signs { resolution, ..Signs::new(indicators) };
+    }
+
+    /// Says how exact the run keeps its point, first entries first.
+    pub(crate) fn resolve(&mut self, resolution: impl Iterator<Item = f64>) {
+        self.resolution.clear();
+        self.resolution.extend(resolution);
+    }
+
+    /// From now on the sign of an indicator counts only where its value is greater than what the resolution of the run makes of
+    /// it: what is zero but for rounding, as the side slip of a car that drives straight on, changes its sign by rounding.
+    pub(crate) fn look_coarsely(&mut self, indicator: usize) {
+        self.coarse[indicator] = !self.resolution.is_empty();
+    }
+
+    /// The sign of this indicator counts as it is, whether it is looked at coarsely or not: it is known to have changed. `None`:
+    /// of no such indicator.
+    pub(super) fn sharpen(&mut self, indicator: Option<usize>) {
+        self.sharp = indicator;
     }
 
     /// One held sign, for tests.
@@ -135,6 +179,31 @@ impl Signs {
         if let Some(indicator) = self.values.iter().position(|value| value.is_nan()) {
             return Err(Failure::NotFinite { time: t, what: Affected::Other(events.indicator_name(indicator)) });
         }
-        Ok(self.held.iter().zip(&self.values).position(|(&held, &value)| held != (value > 0.0)))
+        let turned = |signs: &Signs, i: usize| signs.held[i] != (signs.values[i] > 0.0);
+        let counts = |signs: &Signs, i: usize| !signs.coarse[i] || signs.sharp == Some(i);
+        let n = self.values.len();
+        let Some(first) = (0..n).find(|&i| turned(self, i)) else { return Ok(None) };
+        if counts(self, first) {
+            return Ok(Some(first));
+        }
+        let spread = self.spread(events, t, point);
+        Ok((first..n).find(|&i| turned(self, i) && (counts(self, i) || self.values[i].abs() > spread[i])))
+    }
+
+    /// By how much indicators differ within the resolution of the run.
+    fn spread(&self, events: &mut dyn Events, t: f64, point: &[f64]) -> Vec<f64> {
+        let (mut spread, mut values) = (vec![0.0f64; self.values.len()], self.values.clone());
+        for shift in 0..SHAKEN {
+            let mut shaken = point.to_vec();
+            for (i, (entry, resolution)) in shaken.iter_mut().zip(&self.resolution).enumerate() {
+                *entry += if (i >> shift).is_multiple_of(2) { *resolution } else { -resolution };
+            }
+            // Where there are no values nothing is known.
+            if events.event_indicators(t, &shaken, &mut values).is_ok() {
+                let differences = values.iter().zip(&self.values).map(|(there, here)| (there - here).abs());
+                spread.iter_mut().zip(differences).for_each(|(spread, other)| *spread = spread.max(other));
+            }
+        }
+        spread
     }
 }

@@ -8,6 +8,9 @@ const SHARE: f64 = 1e-3;
 /// Absolute tolerance relative to the magnitude of an unknown below which rounding would be mistaken for error.
 const ROUNDING: f64 = 1e-15;
 
+/// Part of the greatest unknown of its sort that is not told apart in any of them: its last digit.
+const BESIDE: f64 = 2e-16;
+
 /// Part of what its equations balance below which an unknown does not count.
 const NOISE: f64 = 1e-12;
 
@@ -34,6 +37,8 @@ pub(super) struct Tolerances {
     /// Magnitude of each unknown, which grows with it; 0 where it is not known yet.
     magnitudes: Vec<f64>,
     absolute: Vec<f64>,
+    /// What sort each unknown is of; empty where that is not known.
+    sorts: Vec<usize>,
     /// Whether magnitudes were looked at for rounding.
     looked: bool,
 }
@@ -52,7 +57,8 @@ impl Tolerances {
         };
         let absolute = given.clone().unwrap_or(vec![0.0; size]);
         let magnitudes = system.scales(t, options.to - t)?;
-        Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, looked: false })
+        let sorts = system.sorts();
+        Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, sorts, looked: false })
     }
 
     /// The relative one.
@@ -77,12 +83,24 @@ impl Tolerances {
         }
         let mut changed = false;
         let share = (SHARE * self.relative).max(ROUNDING).min(self.relative);
-        for ((magnitude, absolute), y) in self.magnitudes.iter_mut().zip(&mut self.absolute).zip(y) {
-            *magnitude = magnitude.max(y.abs());
-            let before = std::mem::replace(absolute, (share * *magnitude).max(f64::MIN_POSITIVE));
+        self.magnitudes.iter_mut().zip(y).for_each(|(magnitude, y)| *magnitude = magnitude.max(y.abs()));
+        let least = self.least();
+        for (i, (magnitude, absolute)) in self.magnitudes.iter().zip(&mut self.absolute).enumerate() {
+            let least = least.get(i).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+            let before = std::mem::replace(absolute, (share * magnitude).max(least));
             changed |= before != *absolute;
         }
         changed
+    }
+
+    /// What is rounding beside the greatest unknown of the same sort, for each unknown: the forces across a car that drives straight
+    /// on are no more than what rounding of those along it leaves, and have no digits of their own.
+    fn least(&self) -> Vec<f64> {
+        let mut greatest = vec![0.0f64; self.sorts.iter().max().map_or(0, |most| most + 1)];
+        for (&sort, &magnitude) in self.sorts.iter().zip(&self.magnitudes) {
+            greatest[sort] = greatest[sort].max(magnitude);
+        }
+        self.sorts.iter().map(|&sort| BESIDE * greatest[sort]).collect()
     }
 
     /// Root of the mean square of `v`, each component relative to what is allowed at `y`.

@@ -190,6 +190,15 @@ impl ImplicitModel {
         self.form.execute(execution, expected)
     }
 
+    /// Machine code of the form, as [`Model::compile_machine`] and [`Model::compile_directional`] make it.
+    ///
+    /// # Errors
+    /// As [`Model::compile_machine`].
+    pub fn compile_machine(&mut self) -> Result<(), MachineError> {
+        self.form.compile_machine()?;
+        self.form.compile_directional()
+    }
+
     /// How the form has been run.
     pub fn executed(&self) -> Vec<Executed> {
         self.form.executed()

@@ -1,6 +1,9 @@
 //! A form as a system to integrate.
 
+use std::collections::BTreeMap;
+
 use super::ImplicitModel;
+use halfarrow_compiler::program::{Observed, State};
 use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System as _, halves, halves_mut};
 
 impl ImplicitModel {
@@ -45,6 +48,19 @@ impl ImplicitSystem for ImplicitModel {
         let of =
             |symbol| tracked.iter().position(|tracked| tracked == symbol).map_or(0.0, |k| known[k]).max(been(symbol));
         Ok(form.code.program.tracked.iter().map(of).collect())
+    }
+
+    fn sorts(&self) -> Vec<usize> {
+        let program = &self.form.code.program;
+        let told: BTreeMap<&str, &Observed> = program.observed.iter().map(|o| (&*o.name, o)).collect();
+        let mut known = BTreeMap::new();
+        let sort = |state: &State| {
+            let observed = told.get(state.name.as_str());
+            let unit = state.unit.as_ref().or_else(|| observed?.unit.as_ref());
+            let count = known.len();
+            *known.entry((observed.map(|o| o.kind), unit.map(ToString::to_string))).or_insert(count)
+        };
+        program.states.iter().map(sort).collect()
     }
 
     fn index(&self, unknown: usize) -> u8 {
