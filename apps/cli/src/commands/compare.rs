@@ -104,7 +104,8 @@ fn times(report: &CompareReport, page: Page) -> String {
     }
     if let Some(reference) = &report.reference {
         let (by, to) = (reference.confirmed_by, reference.confirmed_to);
-        text += &format!("reference: minimal at rtol 1e-12, confirmed by {by} to {to:.0e}\n");
+        let confirmed = if to.is_nan() { String::new() } else { format!(", confirmed by {by} to {to:.0e}") };
+        text += &format!("reference: minimal at rtol 1e-12{confirmed}\n");
     }
     report.notes.iter().for_each(|note| text += &format!("{note}\n"));
     text

@@ -89,7 +89,7 @@ pub struct CompareReport {
 pub struct ReferenceReport {
     /// The form that confirms it.
     pub confirmed_by: &'static str,
-    /// Greatest difference of the motion between the two.
+    /// Greatest difference of the motion between the two; NaN if no other run came to its end.
     pub confirmed_to: f64,
 }
 
@@ -571,9 +571,15 @@ fn notes(report: &CompareReport) -> Vec<String> {
     let reference = report.reference.as_ref();
     let doubted = |r: &&ReferenceReport| r.confirmed_to > 0.1 * report.error || r.confirmed_to.is_nan();
     if let Some(ReferenceReport { confirmed_by: by, confirmed_to: confirmed }) = reference.filter(doubted) {
-        notes.push(format!(
-            "the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little"
-        ));
+        notes.push(match confirmed.is_nan() {
+            true => {
+                "no other run came to its end, so that nothing confirms the reference: errors are differences from it"
+                    .into()
+            }
+            false => {
+                format!("the reference is confirmed by the form {by} to {confirmed:.0e} only: errors below say little")
+            }
+        });
     }
     for row in &report.rows {
         let warnings = row.audit.iter().flat_map(|audit| &audit.warnings);

@@ -20,7 +20,7 @@ pub(super) const POINTS: f64 = 200.0;
 pub(super) struct Reference {
     pub to: f64,
     columns: BTreeMap<String, Column>,
-    /// Error of the reference itself: what the run that confirms it makes of the motion.
+    /// Error of the reference itself: what the run that confirms it makes of the motion; NaN if none does.
     pub confirmed: f64,
     /// The form and method that confirm it.
     pub by: (Form, Method),
@@ -79,6 +79,10 @@ impl Reference {
             confirmed: f64::NAN,
             by: (Form::Minimal, Method::Auto),
         };
+        // Nothing confirms itself.
+        if confirming.is_none() && candidates.len() == 1 {
+            return Ok(made(&candidates[0].1));
+        }
         let (form, check) = confirming.unwrap_or_else(|| (Form::Minimal, candidates[candidates.len() - 1].1.clone()));
         let mut judged: Vec<Reference> = Vec::new();
         for (method, trace) in &candidates {

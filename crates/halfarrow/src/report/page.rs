@@ -282,8 +282,11 @@ fn remarks(report: &CompareReport) -> Markup {
                 }
             }
             @if let Some(reference) = &report.reference {
-                li { "Errors are measured against the minimal form at a relative tolerance of 10" sup { "−12" } ", which "
-                    (reference.confirmed_by) " confirms to " (number(round(reference.confirmed_to))) "." }
+                li { "Errors are measured against the minimal form at a relative tolerance of 10" sup { "−12" }
+                    @if !reference.confirmed_to.is_nan() {
+                        ", which " (reference.confirmed_by) " confirms to " (number(round(reference.confirmed_to)))
+                    }
+                    "." }
             }
             @for note in &report.notes { li { (note) } }
         }
