@@ -45,9 +45,9 @@ pub trait ImplicitSystem {
     fn scales(&mut self, t: f64, span: f64) -> Result<Vec<f64>, Failure>;
 
     /// What sort each unknown is of, one entry an unknown: those of one sort are told in the same unit, and what is rounding
-    /// beside the greatest of them says nothing. Empty where that is not known.
+    /// beside the greatest of them says nothing. Each is of its own where that is not known.
     fn sorts(&self) -> Vec<usize> {
-        Vec::new()
+        (0..self.unknowns()).collect()
     }
 
     /// Index of an unknown: 1, 2 or 3.

@@ -37,9 +37,7 @@ pub fn shares(x: &mut Exprs, causal: &CausalGraph, missing: impl Fn(Symbol) -> b
     };
     for state in &ports.ports {
         let Some(carried) = causal.graph.elements[state.port.element].carries else { continue };
-        let open: BTreeMap<Symbol, Expr> =
-            x.symbols_of(carried).into_iter().filter(|&s| missing(s)).map(|s| (s, ZERO)).collect();
-        let carried = if open.is_empty() { carried } else { x.substitute(carried, &open) };
+        let carried = put_in(x, carried, |s| missing(s).then_some(ZERO));
         if !x.is_zero(carried) {
             add(x, &mut known, state.input, carried);
         }
@@ -78,8 +76,7 @@ pub fn reading_shares(graph: BondGraph) -> BondGraph {
     // What cannot be assigned is told where causality is.
     let Ok(mut causal) = assign_causality(&graph) else { return graph };
     let mut x = std::mem::take(&mut causal.graph.exprs);
-    let missing = std::mem::take(&mut causal.ports.undetermined);
-    let shares = shares(&mut x, &causal, |s| missing.contains(&s));
+    let shares = shares(&mut x, &causal, |s| causal.ports.undetermined.contains(&s));
     let mut wanted: BTreeSet<Symbol> = shares.iter().filter(|s| read.contains(&s.of)).map(|s| s.symbol).collect();
     if wanted.is_empty() {
         return graph;
@@ -92,22 +89,28 @@ pub fn reading_shares(graph: BondGraph) -> BondGraph {
     let mut written: BTreeMap<Symbol, Expr> = BTreeMap::new();
     let mut whole: BTreeMap<Symbol, Expr> = BTreeMap::new();
     for share in shares.iter().filter(|s| wanted.contains(&s.symbol)) {
-        let value = x.substitute(share.value, &written);
+        let value = put_in(&mut x, share.value, |s| written.get(&s).copied());
         written.insert(share.symbol, value);
-        let bare = x.sym(share.of);
-        whole.insert(share.of, x.add(&[bare, value]));
+        if read.contains(&share.of) {
+            let bare = x.sym(share.of);
+            whole.insert(share.of, x.add(&[bare, value]));
+        }
     }
-    whole.retain(|of, _| read.contains(of));
     let mut graph = causal.graph;
     graph.exprs = x;
     let own = own_efforts(&graph);
     graph.rewrite_laws(&mut |x, e, element| {
         let own = element.map_or(&[][..], |element| &own[element.index()]);
-        let others = x.symbols_of(e).into_iter().filter(|s| !own.contains(s));
-        let read: BTreeMap<Symbol, Expr> = others.filter_map(|s| Some((s, *whole.get(&s)?))).collect();
-        if read.is_empty() { e } else { x.substitute(e, &read) }
+        put_in(x, e, |s| whole.get(&s).copied().filter(|_| !own.contains(&s)))
     });
     graph
+}
+
+/// An expression with what is given in the place of its symbols.
+fn put_in(x: &mut Exprs, e: Expr, given: impl Fn(Symbol) -> Option<Expr>) -> Expr {
+    let read: BTreeMap<Symbol, Expr> =
+        x.symbols_of(e).into_iter().filter_map(|s| given(s).map(|given| (s, given))).collect();
+    if read.is_empty() { e } else { x.substitute(e, &read) }
 }
 
 /// The efforts that are read by laws of other elements, where some may have a share; those of constraints have none.

@@ -180,9 +180,8 @@ fn order_equations(
     };
     let Assembled { mut d, states, rows, balances, .. } = assembled;
     drop((rows, balances));
-    let missing: BTreeSet<Symbol> = d.missing.keys().copied().collect();
     let mut share_of = BTreeMap::new();
-    for share in shares(&mut d.x, truth, |s| missing.contains(&s)) {
+    for share in shares(&mut d.x, truth, |s| d.missing.contains_key(&s)) {
         d.set(share.symbol, share.value);
         share_of.insert(share.of, share.symbol);
     }

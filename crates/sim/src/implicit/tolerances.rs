@@ -37,8 +37,9 @@ pub(super) struct Tolerances {
     /// Magnitude of each unknown, which grows with it; 0 where it is not known yet.
     magnitudes: Vec<f64>,
     absolute: Vec<f64>,
-    /// What sort each unknown is of; empty where that is not known.
+    /// What sort each unknown is of, and the greatest magnitude of each sort.
     sorts: Vec<usize>,
+    greatest: Vec<f64>,
     /// Whether magnitudes were looked at for rounding.
     looked: bool,
 }
@@ -58,7 +59,8 @@ impl Tolerances {
         let absolute = given.clone().unwrap_or(vec![0.0; size]);
         let magnitudes = system.scales(t, options.to - t)?;
         let sorts = system.sorts();
-        Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, sorts, looked: false })
+        let greatest = vec![0.0; sorts.iter().max().map_or(0, |most| most + 1)];
+        Ok(Tolerances { relative: options.rtol, given, magnitudes, absolute, sorts, greatest, looked: false })
     }
 
     /// The relative one.
@@ -83,24 +85,19 @@ impl Tolerances {
         }
         let mut changed = false;
         let share = (SHARE * self.relative).max(ROUNDING).min(self.relative);
-        self.magnitudes.iter_mut().zip(y).for_each(|(magnitude, y)| *magnitude = magnitude.max(y.abs()));
-        let least = self.least();
-        for (i, (magnitude, absolute)) in self.magnitudes.iter().zip(&mut self.absolute).enumerate() {
-            let least = least.get(i).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+        self.greatest.fill(0.0);
+        for ((magnitude, y), &sort) in self.magnitudes.iter_mut().zip(y).zip(&self.sorts) {
+            *magnitude = magnitude.max(y.abs());
+            self.greatest[sort] = self.greatest[sort].max(*magnitude);
+        }
+        // The forces across a car that drives straight on are no more than what rounding of those along it leaves, and have no
+        // digits of their own.
+        for ((magnitude, absolute), &sort) in self.magnitudes.iter().zip(&mut self.absolute).zip(&self.sorts) {
+            let least = (BESIDE * self.greatest[sort]).max(f64::MIN_POSITIVE);
             let before = std::mem::replace(absolute, (share * magnitude).max(least));
             changed |= before != *absolute;
         }
         changed
-    }
-
-    /// What is rounding beside the greatest unknown of the same sort, for each unknown: the forces across a car that drives straight
-    /// on are no more than what rounding of those along it leaves, and have no digits of their own.
-    fn least(&self) -> Vec<f64> {
-        let mut greatest = vec![0.0f64; self.sorts.iter().max().map_or(0, |most| most + 1)];
-        for (&sort, &magnitude) in self.sorts.iter().zip(&self.magnitudes) {
-            greatest[sort] = greatest[sort].max(magnitude);
-        }
-        self.sorts.iter().map(|&sort| BESIDE * greatest[sort]).collect()
     }
 
     /// Root of the mean square of `v`, each component relative to what is allowed at `y`.
