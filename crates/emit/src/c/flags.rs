@@ -83,6 +83,10 @@ flags! {
     newton
     /// Large sparse solve blocks.
     sparse
+    /// Solve blocks of so many equations, which are written out.
+    two_equations
+    three_equations
+    four_equations
     /// Such of one unknown.
     newton_single
     /// Newton blocks in rates or outputs.

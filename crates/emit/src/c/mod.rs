@@ -7,6 +7,7 @@ mod blocks;
 mod compose;
 mod cost;
 mod derivatives;
+mod few;
 pub(crate) mod flags;
 mod fragment;
 mod function;

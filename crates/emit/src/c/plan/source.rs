@@ -5,6 +5,7 @@ use halfarrow_compiler::program::{ConditionKind, EventTrigger, LawDomain, Reads}
 
 use super::step_order::StepOrder;
 use super::{ModeTables, Plan};
+use crate::c::few;
 use crate::c::flags::Flags;
 use crate::c::fragment::{Fragment, assembled};
 use crate::c::header::comment;
@@ -80,6 +81,8 @@ impl Plan<'_> {
         put(filling.fragments(include_str!("../runtime/helpers.c")));
         if self.sizes.order > 0 {
             put(filling.fragments(include_str!("../runtime/lu.c")));
+            put(filling.fragments(&few::TEMPLATE));
+            put(filling.fragments(include_str!("../runtime/linear.c")));
         }
         if !self.newton.is_empty() {
             put(filling.fragments(NEWTON));
@@ -129,6 +132,7 @@ impl Plan<'_> {
         let bounds = mode.filter(|mode| mode.has_laws());
         let held = !(self.delays.is_empty() && self.samples.is_empty());
         let time_derivative = export.method.is_linearly_implicit();
+        let few = |n: usize| export.real == Real::Double && p.blocks.values().any(|block| block.size() == n);
         let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
         Flags {
             single: export.real == Real::Float,
@@ -166,6 +170,9 @@ impl Plan<'_> {
             only_samples: held && self.delays.is_empty(),
             newton: !self.newton.is_empty(),
             sparse: self.patterns.any_sparse(),
+            two_equations: few(2),
+            three_equations: few(3),
+            four_equations: few(4),
             newton_single: self.newton.iter().any(|&b| p.blocks[b].size() == 1),
             follows: !(self.rates_blocks.is_empty() && self.shown_blocks.is_empty()),
             rates_newton: !self.rates_blocks.is_empty(),

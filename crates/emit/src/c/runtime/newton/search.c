@@ -178,18 +178,18 @@ static int ha_same(const $real *a, const $real *b, int n)
 
 //item ha_has_root
 /* Whether the root is known: that found last, or the previous solution, where the block reads what it read then. */
-static int ha_has_root(ha_model *m, const ha_newton *w, int number, const $real *o)
+static int ha_has_root(ha_model *m, const ha_kept *k, int number, const $real *o)
 {
-    const int reads = w->block->reads;
-    if (m->fresh[number] && $ha_same(o, w->outer, reads)) {
+    const int reads = k->block->reads;
+    if (m->fresh[number] && $ha_same(o, k->outer, reads)) {
         return 1;
     }
-    if (!m->settled[number] || !$ha_same(o, w->previous_outer, reads)) {
+    if (!m->settled[number] || !$ha_same(o, k->previous_outer, reads)) {
         return 0;
     }
-    $ha_copy(w->x, w->previous, w->n);
-    $ha_copy(w->outer, w->previous_outer, reads);
-    $ha_copy(w->jacobian, w->previous_jacobian, w->entries);
+    $ha_copy(k->x, k->previous, k->n);
+    $ha_copy(k->outer, k->previous_outer, reads);
+    $ha_copy(k->jacobian, k->previous_jacobian, k->entries);
     m->fresh[number] = 1;
 //if sought_positions
     m->motion_short[number] = 1;
@@ -201,12 +201,14 @@ static int ha_has_root(ha_model *m, const ha_newton *w, int number, const $real 
 /* The root of a block that continues its previous solution, at a start or an event any root; o: what the block reads. */
 static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
 {
-    ha_newton w = $ha_newton_of(m, number);
+    const ha_kept kept = $ha_kept_of(m, number);
+    ha_newton w;
     int status;
-    if ($ha_has_root(m, &w, number, o)) {
-        $ha_copy(x, w.x, w.n);
+    if ($ha_has_root(m, &kept, number, o)) {
+        $ha_copy(x, kept.x, kept.n);
         return $MODEL_OK;
     }
+    w = $ha_newton_of(m, number);
     m->fresh[number] = 0;
     $ha_copy(w.outer, o, w.block->reads);
     $ha_copy(w.present, o, w.block->reads);

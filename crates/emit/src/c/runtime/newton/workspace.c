@@ -106,14 +106,49 @@ static $real *ha_take($real **place, int n)
     return taken;
 }
 
+//always
+/* What is kept of a block: the previous solution, what the block read there, and its Jacobian; the same of the solution found
+ * last; and the first place behind them. */
+typedef struct {
+    const ha_block *block;
+    int n;
+    int entries;
+    $real *previous;
+    $real *previous_outer;
+    $real *previous_jacobian;
+    $real *x;
+    $real *outer;
+    $real *jacobian;
+    $real *end;
+} ha_kept;
+
+//item ha_kept_of
+static ha_kept ha_kept_of(ha_model *m, int number)
+{
+    const ha_block *block = &$ha_blocks[number];
+    ha_kept k;
+    k.block = block;
+    k.n = block->pattern->n;
+    k.entries = $ha_entries(block->pattern);
+    k.previous = m->memory + block->memory;
+    k.previous_outer = k.previous + k.n;
+    k.previous_jacobian = k.previous_outer + block->reads;
+    k.x = k.previous_jacobian + k.entries;
+    k.outer = k.x + k.n;
+    k.jacobian = k.outer + block->reads;
+    k.end = k.jacobian + k.entries;
+    return k;
+}
+
 //item ha_newton_of
 static ha_newton ha_newton_of(ha_model *m, int number)
 {
-    const ha_block *block = &$ha_blocks[number];
-    const int n = block->pattern->n;
-    const int entries = $ha_entries(block->pattern);
+    const ha_kept kept = $ha_kept_of(m, number);
+    const ha_block *block = kept.block;
+    const int n = kept.n;
+    const int entries = kept.entries;
     const int reads = block->reads;
-    $real *place = m->memory + block->memory;
+    $real *place = kept.end;
     ha_newton w;
     w.block = block;
     w.n = n;
@@ -132,12 +167,12 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.positions = 0;
 //end
     w.valued = 0;
-    w.previous = $ha_take(&place, n);
-    w.previous_outer = $ha_take(&place, reads);
-    w.previous_jacobian = $ha_take(&place, entries);
-    w.x = $ha_take(&place, n);
-    w.outer = $ha_take(&place, reads);
-    w.jacobian = $ha_take(&place, entries);
+    w.previous = kept.previous;
+    w.previous_outer = kept.previous_outer;
+    w.previous_jacobian = kept.previous_jacobian;
+    w.x = kept.x;
+    w.outer = kept.outer;
+    w.jacobian = kept.jacobian;
 //if sought_positions
     w.rates = NULL;
     w.bends = NULL;
@@ -191,10 +226,10 @@ static ha_newton ha_newton_of(ha_model *m, int number)
 /* The solution found last becomes the previous one, and is followed. */
 static void ha_newton_accept(ha_model *m, int number)
 {
-    const ha_newton w = $ha_newton_of(m, number);
-    $ha_copy(w.previous, w.x, w.n);
-    $ha_copy(w.previous_outer, w.outer, w.block->reads);
-    $ha_copy(w.previous_jacobian, w.jacobian, w.entries);
+    const ha_kept k = $ha_kept_of(m, number);
+    $ha_copy(k.previous, k.x, k.n);
+    $ha_copy(k.previous_outer, k.outer, k.block->reads);
+    $ha_copy(k.previous_jacobian, k.jacobian, k.entries);
 //if single
     /* Of so few digits, it is refined where it is sought again. */
     m->fresh[number] = 0;
@@ -202,7 +237,7 @@ static void ha_newton_accept(ha_model *m, int number)
 //else
     /* Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more. */
 //if sought_positions
-    m->fresh[number] = m->fresh[number] && !w.block->position;
+    m->fresh[number] = m->fresh[number] && !k.block->position;
 //end
     m->settled[number] = m->fresh[number];
 //end
