@@ -87,8 +87,9 @@ pub fn order(d: &mut Definitions, symbols: &[Symbol], first: &BTreeSet<Symbol>) 
         }
         match component[..] {
             [only] if is_direct(d, only) => {
-                let value = d.of[&only].expr();
+                let mut value = d.of[&only].expr();
                 if d.x.is_zero(value) {
+                    value = ZERO;
                     zeros.insert(only, value);
                 }
                 ordered.steps.push(EquationStep::Assign { symbol: only, value });

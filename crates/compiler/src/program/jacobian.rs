@@ -74,6 +74,7 @@ impl Program {
             let gradients = work.gradients.get(value).into_iter().flat_map(|s| s.iter());
             entries.extend(gradients.map(|&(column, value)| JacobianEntry { row: row as u32, column, value }));
         }
+        work.values.settle();
         let program = Program { values: work.values, blocks: work.blocks, ..self.clone() };
         debug_assert_eq!(verify(&program), Ok(()), "{}", self.name);
         Differentiated { program, entries }

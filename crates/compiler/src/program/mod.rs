@@ -34,6 +34,7 @@ mod print;
 mod ratios;
 mod repetition;
 mod routine;
+mod samples;
 mod schedule;
 mod sharing;
 mod start;

@@ -29,7 +29,7 @@ use std::sync::Arc;
 /// If a step reads a symbol that is not given or defined before it: then the equations are not in evaluation order.
 pub fn schedule(equations: &Equations) -> Program {
     let graph = &equations.graph;
-    let exprs = evaluated(equations);
+    let (exprs, needed) = evaluated(equations);
     let fixed: FxHashSet<Symbol> = graph.parameters.values().map(|p| p.symbol).collect();
     let varies = |e| graph.exprs.depends_on_any(e, &|s| !fixed.contains(&s));
     let sharing = share(&graph.exprs, &exprs, &varies);
@@ -44,12 +44,16 @@ pub fn schedule(equations: &Equations) -> Program {
     };
     let parameters = schedule.parameters();
     schedule.givens(equations);
-    equations.steps.iter().for_each(|step| schedule.step(step));
+    // What rates are made of comes first: where a value is equal to one that is there, that one is computed in any case.
+    for wanted in [true, false] {
+        let steps = equations.steps.iter().zip(&needed).filter(|(_, needed)| **needed == wanted);
+        steps.for_each(|(step, _)| schedule.step(step));
+    }
     schedule.finish(equations, parameters)
 }
 
-/// Every expression that the rates are evaluated from, and all below it.
-fn evaluated(equations: &Equations) -> Vec<Expr> {
+/// Every expression that the rates are evaluated from, and all below it; for each step whether it gives one of these.
+fn evaluated(equations: &Equations) -> (Vec<Expr>, Vec<bool>) {
     let exprs = &equations.graph.exprs;
     let mut step_of: Vec<Option<u32>> = vec![None; exprs.symbol_count()];
     let mut gives = |symbol: Symbol, step: usize| step_of[symbol.0 as usize] = Some(step as u32);
@@ -83,7 +87,7 @@ fn evaluated(equations: &Equations) -> Vec<Expr> {
             }
         }
         if read == roots.len() {
-            return exprs.below(&roots, &|_| true);
+            return (exprs.below(&roots, &|_| true), seen);
         }
         roots[read..].iter().for_each(|&e| open.extend(exprs.symbols_of(e).iter()));
         read = roots.len();
@@ -189,7 +193,13 @@ impl Schedule<'_> {
     }
 
     fn linear(&mut self, unknowns: &[Symbol], matrix: &SparseMatrix<Expr>, right: &[Expr], elements: &[ElementId]) {
-        let matrix = Arc::new(Matrix::new(matrix.map(|&e| self.lower.value(e))));
+        let zero = self.lower.constant(0.0);
+        let mut rows: Vec<Vec<(usize, Value)>> = Vec::with_capacity(matrix.size());
+        for row in matrix.rows() {
+            let entries = row.map(|(column, &e)| (column, self.lower.value(e)));
+            rows.push(entries.filter(|entry| entry.1 != zero).collect());
+        }
+        let matrix = Arc::new(Matrix::new(SparseMatrix::new(rows)));
         let right = right.iter().map(|&e| self.lower.value(e)).collect();
         let elements = self.concerned(elements, unknowns);
         let entries: Vec<Entry> =
@@ -305,6 +315,7 @@ impl Schedule<'_> {
         let position_relations = position_relations(lower, equations);
         let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
 
+        self.lower.values.settle();
         let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
         let flow = Dataflow { values: &values, blocks: &blocks, parameters: &parameters };
         let rates: Vec<Value> = states.iter().map(|s| s.rate).collect();

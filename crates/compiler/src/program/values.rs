@@ -1,7 +1,8 @@
 //! Values: operations on values, equal ones shared.
 
 use super::Value;
-use super::op::Op;
+use super::op::{Bits, Op};
+use super::samples::{Recognised, Samples};
 use crate::ids::Table;
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
@@ -41,25 +42,63 @@ pub struct Values {
     ops: Table<Value, Op>,
     reads: Vec<Reads>,
     known: HashTable<Value>,
+    /// What values are at a few points, from the first product on that moving values make.
+    samples: Option<Box<Samples>>,
 }
 
 impl Values {
-    /// The value of an operation; equal operations are one value. For a solution, `reads` is what its block reads.
+    /// The value of an operation; equal operations are one value, and so are operations that are found to be equal. For a
+    /// solution, `reads` is what its block reads.
     pub(super) fn add(&mut self, op: Op, reads: Reads) -> Value {
-        let Values { ops, known, .. } = self;
-        let hash = |op: &Op| FxBuildHasher.hash_one(op);
-        let at = hash(&op);
-        if let Some(&known) = known.find(at, |&value| ops[value] == op) {
+        if let Some(known) = self.find(op) {
             return known;
         }
         let mut all = reads;
         op.for_each_operand(|v| all = all.with(self.reads(v)));
-        self.reads.push(all);
+        if self.samples.is_none() && self.is_moving_product(op) {
+            let mut samples = Samples::default();
+            self.ops.values().for_each(|&op| samples.add(op));
+            self.samples = Some(Box::new(samples));
+        }
+        let recognised = self.samples.as_ref().and_then(|samples| samples.recognise(op, all, |v| self.reads(v)));
+        match recognised {
+            None => self.push(op, all),
+            Some(Recognised::Known(value)) => value,
+            Some(Recognised::Number(number)) => self.push_once(Op::Constant(Bits::of(number)), Reads::PARAMETERS),
+            Some(Recognised::Opposite(value)) => match self.op(value) {
+                Op::Neg(value) => value,
+                _ => self.push_once(Op::Neg(value), self.reads(value)),
+            },
+        }
+    }
+
+    fn push_once(&mut self, op: Op, reads: Reads) -> Value {
+        self.find(op).unwrap_or_else(|| self.push(op, reads))
+    }
+
+    fn push(&mut self, op: Op, reads: Reads) -> Value {
+        let hash = |op: &Op| FxBuildHasher.hash_one(op);
+        self.reads.push(reads);
+        if let Some(samples) = &mut self.samples {
+            samples.add(op);
+        }
         let value = self.ops.push(op);
         let Values { ops, known, .. } = self;
-        known.insert_unique(at, value, |&value| hash(&ops[value]));
+        known.insert_unique(hash(&op), value, |&value| hash(&ops[value]));
         value
     }
+
+    /// Whether two values that move are multiplied, or divided by each other.
+    fn is_moving_product(&self, op: Op) -> bool {
+        let moves = |v: Value| self.reads(v).includes(Reads::STATE) || self.reads(v).includes(Reads::GUESS);
+        matches!(op, Op::Mul(a, b) | Op::Div(a, b) if moves(a) && moves(b))
+    }
+
+    /// Forgets what values are at a few points, which takes more memory than all the rest.
+    pub(super) fn settle(&mut self) {
+        self.samples = None;
+    }
+
     /// The value of an operation, if there is one.
     pub fn find(&self, op: Op) -> Option<Value> {
         self.known.find(FxBuildHasher.hash_one(op), |&value| self.ops[value] == op).copied()
