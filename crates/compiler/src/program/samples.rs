@@ -225,8 +225,8 @@ impl Samples {
             Op::Mul(a, b) => Sample::product(of(a), of(b)),
             Op::Div(a, b) => Sample::product(of(a), &of(b).reciprocal()),
             Op::Powi(n, a) => of(a).power(n),
-            Op::Call(Function::Sin, a) => Sample::of(own(a.index(), of(a).is_guessed()).map(f64::sin)),
-            Op::Call(Function::Cos, a) => Sample::of(own(a.index(), of(a).is_guessed()).map(f64::cos)),
+            Op::Call(Function::Sin, a) => Sample::of(own(a.index(), of(a).is_guessed()).map(math::sin)),
+            Op::Call(Function::Cos, a) => Sample::of(own(a.index(), of(a).is_guessed()).map(math::cos)),
             _ => {
                 let mut guessed = matches!(op, Op::Guess(..));
                 op.for_each_operand(|value| guessed |= of(value).is_guessed());
