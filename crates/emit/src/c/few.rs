@@ -89,16 +89,10 @@ static void ha_lu_substitute_{n}(const ha_lu *l, $real *b)
     (0..n).for_each(|row| line(&mut text, 1, format_args!("$real w{row} = b[o[{row}]];")));
     line(&mut text, 1, format_args!("$real product;"));
     for row in 0..n {
-        for k in 0..row {
-            line(&mut text, 1, format_args!("product = f[{}] * w{k};", row * n + k));
-            line(&mut text, 1, format_args!("w{row} -= product;"));
-        }
+        (0..row).for_each(|k| less(&mut text, format_args!("w{row}"), format_args!("f[{}] * w{k}", row * n + k)));
     }
     for row in (0..n).rev() {
-        for k in row + 1..n {
-            line(&mut text, 1, format_args!("product = f[{}] * w{k};", row * n + k));
-            line(&mut text, 1, format_args!("w{row} -= product;"));
-        }
+        (row + 1..n).for_each(|k| less(&mut text, format_args!("w{row}"), format_args!("f[{}] * w{k}", row * n + k)));
         line(&mut text, 1, format_args!("w{row} /= f[{}];", row * n + row));
         line(&mut text, 1, format_args!("b[{row}] = w{row};"));
     }
@@ -119,10 +113,7 @@ static void ha_lu_solve_{n}(const ha_lu *l, $real *b)
     (0..n).for_each(|row| line(&mut text, 1, format_args!("rest[{row}] = b[{row}];")));
     line(&mut text, 1, format_args!("$ha_lu_substitute_{n}(l, b);"));
     for row in 0..n {
-        for k in 0..n {
-            line(&mut text, 1, format_args!("product = a[{}] * b[{k}];", row * n + k));
-            line(&mut text, 1, format_args!("rest[{row}] -= product;"));
-        }
+        (0..n).for_each(|k| less(&mut text, format_args!("rest[{row}]"), format_args!("a[{}] * b[{k}]", row * n + k)));
     }
     line(&mut text, 1, format_args!("$ha_lu_substitute_{n}(l, rest);"));
     for row in 0..n {
@@ -131,6 +122,12 @@ static void ha_lu_solve_{n}(const ha_lu *l, $real *b)
         line(&mut text, 1, format_args!("}}"));
     }
     text + "}\n\n"
+}
+
+/// Takes a product off, which is rounded first.
+fn less(text: &mut String, from: std::fmt::Arguments, product: std::fmt::Arguments) {
+    line(text, 1, format_args!("product = {product};"));
+    line(text, 1, format_args!("{from} -= product;"));
 }
 
 fn line(text: &mut String, depth: usize, of: std::fmt::Arguments) {
