@@ -334,6 +334,8 @@ pub enum Solver {
     ImplicitMidpoint,
     /// Order 1, linearly implicit, fixed step, for stiff models
     LinearlyImplicitEuler,
+    /// Order 2, linearly implicit, fixed step, for stiff models in real time: one evaluation a step, a Jacobian that is kept
+    LinearlyImplicitBdf2,
     /// Order 3, linearly implicit, fixed step, for stiff models
     Rosenbrock,
 }
@@ -798,6 +800,8 @@ pub enum FixedSolver {
     ImplicitMidpoint,
     /// Order 1, linearly implicit, for stiff models
     LinearlyImplicitEuler,
+    /// Order 2, linearly implicit, for stiff models: one evaluation a step, a Jacobian that is kept
+    LinearlyImplicitBdf2,
     /// Order 3, linearly implicit, for stiff models
     Rosenbrock,
 }

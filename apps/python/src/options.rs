@@ -111,6 +111,7 @@ pub fn fixed(name: &str) -> PyResult<FixedMethod> {
         "rk4" => Ok(FixedMethod::Rk4),
         "implicit-midpoint" => Ok(FixedMethod::ImplicitMidpoint),
         "linearly-implicit-euler" => Ok(FixedMethod::LinearlyImplicitEuler),
+        "linearly-implicit-bdf2" => Ok(FixedMethod::LinearlyImplicitBdf2),
         "rosenbrock" => Ok(FixedMethod::Rosenbrock),
         other => Err(none("method", other)),
     }

@@ -41,18 +41,21 @@ pub enum Method {
     ImplicitMidpoint,
     /// Linearly implicit Euler.
     LinearlyImplicitEuler,
+    /// Linearly implicit BDF of two steps, with a Jacobian that is kept.
+    LinearlyImplicitBdf2,
     /// RODAS3, a linearly implicit method of order 3.
     Rosenbrock,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Method; 6] = [
+    pub const ALL: [Method; 7] = [
         Method::Euler,
         Method::Heun,
         Method::Rk4,
         Method::ImplicitMidpoint,
         Method::LinearlyImplicitEuler,
+        Method::LinearlyImplicitBdf2,
         Method::Rosenbrock,
     ];
 
@@ -64,6 +67,7 @@ impl Method {
             Method::Rk4 => "rk4",
             Method::ImplicitMidpoint => "implicit_midpoint",
             Method::LinearlyImplicitEuler => "linearly_implicit_euler",
+            Method::LinearlyImplicitBdf2 => "linearly_implicit_bdf2",
             Method::Rosenbrock => "rosenbrock",
         }
     }
@@ -71,20 +75,32 @@ impl Method {
     /// Stages of a step; of the midpoint rule of an iteration.
     pub fn stages(self) -> usize {
         match self {
-            Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler => 1,
+            Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler | Method::LinearlyImplicitBdf2 => {
+                1
+            }
             Method::Heun => 2,
             Method::Rk4 | Method::Rosenbrock => 4,
         }
     }
 
-    /// Whether a step takes the Jacobian.
+    /// Whether a step takes a matrix.
     pub fn is_implicit(self) -> bool {
-        self == Method::ImplicitMidpoint || self.is_linearly_implicit()
+        self.takes_derivatives() || self.keeps_steps()
     }
 
-    /// Whether it takes one matrix a step, and no iteration.
-    pub fn is_linearly_implicit(self) -> bool {
+    /// Whether a step takes derivatives by the states.
+    pub fn takes_derivatives(self) -> bool {
+        self == Method::ImplicitMidpoint || self.takes_time_derivative()
+    }
+
+    /// Whether it takes them by the states and by time: one matrix a step, and no iteration.
+    pub fn takes_time_derivative(self) -> bool {
         matches!(self, Method::LinearlyImplicitEuler | Method::Rosenbrock)
+    }
+
+    /// Whether it goes on from what it keeps of earlier steps.
+    pub fn keeps_steps(self) -> bool {
+        self == Method::LinearlyImplicitBdf2
     }
 }
 
@@ -166,6 +182,8 @@ pub enum EmitError {
     Events(Vec<String>),
     /// Set-valued laws, whose margins need double precision.
     SingleModes,
+    /// A method that compares rates beside a state, for which single precision has too few digits.
+    SingleDifferences,
     /// A delay would keep too many points with this step: its name, and how many.
     Delay(String, f64),
 }
@@ -201,6 +219,10 @@ impl fmt::Display for EmitError {
             EmitError::SingleModes => f.write_str(
                 "the model has set-valued laws: where their branches end is told from rounding in double precision only; export \
                  with `--real double`",
+            ),
+            EmitError::SingleDifferences => f.write_str(
+                "linearly_implicit_bdf2 takes differences of rates, for which single precision has too few digits: export with \
+                 `--real double`, or with `--method linearly_implicit_euler`",
             ),
             EmitError::Delay(name, points) => write!(
                 f,

@@ -123,7 +123,8 @@ guess th2 = -1.2, th3 = -2
 Se:push(3) -> crank
 when every 11 ms { reset two.f = 0.9*two.f; k = k + 1 }
 ";
-    for method in [FixedMethod::Heun, FixedMethod::Rk4, FixedMethod::Rosenbrock] {
+    use FixedMethod::{Heun, LinearlyImplicitBdf2, Rk4, Rosenbrock};
+    for method in [Heun, Rk4, Rosenbrock, LinearlyImplicitBdf2] {
         takes_no_memory_at_events(text, method);
         takes_no_memory_at_events(closed, method);
     }

@@ -6,6 +6,7 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
 use halfarrow_exec::{Compiled, ImplicitModel, Memory, Model, Setup};
 use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::fixed_step::History;
 use halfarrow_sim::{Events, Position, Stepwise, halves_mut};
 use std::sync::Arc;
 
@@ -40,7 +41,7 @@ fn setup(compiled: &Compiled) -> Setup {
 }
 
 /// A run in a moment: all that it takes to go on.
-type Saved = (Position, Memory, Vec<f64>);
+type Saved = (Position, Option<History>, Memory, Vec<f64>);
 
 /// Steps from one number of a step to another, and what was recorded at each of them.
 fn go(model: &mut Model, run: &mut Stepwise, x: &mut [f64], steps: std::ops::Range<usize>) -> Vec<u64> {
@@ -57,7 +58,10 @@ fn go(model: &mut Model, run: &mut Stepwise, x: &mut [f64], steps: std::ops::Ran
 #[test]
 fn a_run_goes_on_with_the_same_bits() {
     let compiled = Arc::new(Compiled::new(program(Form::Minimal)));
-    for (machine, method) in [(false, FixedMethod::Rk4), (true, FixedMethod::Rk4), (false, FixedMethod::Rosenbrock)] {
+    use FixedMethod::{LinearlyImplicitBdf2, Rk4, Rosenbrock};
+    for (machine, method) in
+        [(false, Rk4), (true, Rk4), (false, Rosenbrock), (false, LinearlyImplicitBdf2), (true, LinearlyImplicitBdf2)]
+    {
         let instance = || {
             let mut model = Model::of(compiled.clone()).expect("parameters that fit");
             model.set_up(&setup(&compiled)).expect("what can be solved");
@@ -71,15 +75,15 @@ fn a_run_goes_on_with_the_same_bits() {
         let mut run = Stepwise::new(method, 0.0, &model);
         run.start(&mut model, &mut x).expect("a start");
         go(&mut model, &mut run, &mut x, 0..97);
-        let saved: Saved = (run.position().clone(), model.memory(), x.clone());
+        let saved: Saved = (run.position().clone(), run.history().cloned(), model.memory(), x.clone());
         let whole = go(&mut model, &mut run, &mut x, 97..250);
         assert!(run.summary().crossings > 0 && run.summary().jumps > 30, "{:?}", run.summary());
-        assert_ne!(model.memory(), saved.1);
+        assert_ne!(model.memory(), saved.2);
 
         let again = |model: &mut Model| {
-            let (position, memory, mut x) = saved.clone();
+            let (position, history, memory, mut x) = saved.clone();
             let mut run = Stepwise::new(method, 0.0, model);
-            run.restore(&position);
+            run.restore(&position, history.as_ref());
             model.restore(&memory);
             assert_eq!(model.memory(), memory);
             go(model, &mut run, &mut x, 97..250)

@@ -433,6 +433,7 @@ fn method(method: FixedMethod) -> emit::Method {
         FixedMethod::Rk4 => emit::Method::Rk4,
         FixedMethod::ImplicitMidpoint => emit::Method::ImplicitMidpoint,
         FixedMethod::LinearlyImplicitEuler => emit::Method::LinearlyImplicitEuler,
+        FixedMethod::LinearlyImplicitBdf2 => emit::Method::LinearlyImplicitBdf2,
         FixedMethod::Rosenbrock => emit::Method::Rosenbrock,
     }
 }

@@ -4,7 +4,7 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
-use halfarrow_sim::fixed_step::FixedMethod;
+use halfarrow_sim::fixed_step::{FixedMethod, History};
 use halfarrow_sim::{Events as _, Method, Position, Stepwise, tick};
 
 use crate::compiled::Compiled;
@@ -57,6 +57,7 @@ pub struct Snapshot {
     setup: exec::Setup,
     memory: exec::Memory,
     position: Position,
+    history: Option<History>,
     steps: u64,
     from: f64,
     x: Vec<f64>,
@@ -208,6 +209,7 @@ impl Stepper {
             setup: self.system.setup().clone(),
             memory: self.system.memory(),
             position: self.run.position().clone(),
+            history: self.run.history().cloned(),
             steps: self.steps,
             from: self.from,
             x: self.x.clone(),
@@ -225,7 +227,7 @@ impl Stepper {
         self.inputs.clone_from(&saved.inputs);
         self.place_inputs();
         self.system.restore(&saved.memory);
-        self.run.restore(&saved.position);
+        self.run.restore(&saved.position, saved.history.as_ref());
         self.x.clone_from(&saved.x);
         (self.steps, self.from) = (saved.steps, saved.from);
         Ok(())

@@ -233,9 +233,10 @@ fn exchanges() {
 /// Random circuits and rows of bodies: one of each kind by each method in turn.
 #[test]
 fn random() {
-    let methods = [FixedMethod::Rk4, FixedMethod::Heun, FixedMethod::Rosenbrock];
+    use FixedMethod::{Heun, LinearlyImplicitBdf2, Rk4, Rosenbrock};
+    let methods = [Rk4, Heun, Rosenbrock, LinearlyImplicitBdf2];
     let of = |name, (text, _): (String, Vec<String>), method| Case { step: 5e-3, ..case(name, text, method, 3.0) };
-    for (k, seed) in (3000..3003u64).enumerate() {
+    for (k, seed) in (3000..3004u64).enumerate() {
         let method = |more: usize| methods[(k + more) % methods.len()];
         check(&[of("circuit", circuit(seed), method(0)), of("row", row(seed, k == 1), method(1))]);
     }

@@ -105,7 +105,8 @@ pub trait Transposed {
 impl FixedMethod {
     /// Whether its steps can be followed backwards: those of linearly implicit methods would need second derivatives.
     pub fn goes_back(self) -> bool {
-        !matches!(self, FixedMethod::Rosenbrock | FixedMethod::LinearlyImplicitEuler)
+        use FixedMethod::{LinearlyImplicitBdf2, LinearlyImplicitEuler, Rosenbrock};
+        !matches!(self, Rosenbrock | LinearlyImplicitEuler | LinearlyImplicitBdf2)
     }
 }
 

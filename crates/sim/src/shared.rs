@@ -130,6 +130,9 @@ impl System for Counted<'_> {
     fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure> {
         self.system.time_derivative(t, x, out)
     }
+    fn compares_rates(&self) -> bool {
+        self.system.compares_rates()
+    }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }

@@ -1,7 +1,7 @@
 //! A run that the caller takes from one time to the next.
 
 use crate::driver::{Flow, Nobody, Position, Run};
-use crate::fixed_step::{FixedMethod, FixedStep, Ticks};
+use crate::fixed_step::{FixedMethod, FixedStep, History, Ticks};
 use crate::shared::Counted;
 use crate::simulate::check_start;
 use crate::{Failure, HybridSystem, Method, Options, Stopped, Summary};
@@ -9,8 +9,8 @@ use crate::{Failure, HybridSystem, Method, Options, Stopped, Summary};
 /// A run by a method of fixed step that goes no further than the caller says: a step to there, shorter ones where events
 /// come before. Between two steps the system may be read and set.
 ///
-/// What the run remembers beside the state and the memory of the system is its [`Position`]: all three together saved and
-/// restored, it goes on with the same bits. No step takes memory.
+/// What the run remembers beside the state and the memory of the system is its [`Position`], and the [`History`] of a method of
+/// more than one step: all of these together saved and restored, it goes on with the same bits. No step takes memory.
 pub struct Stepwise {
     method: FixedStep,
     options: Options,
@@ -70,7 +70,7 @@ impl Stepwise {
     /// # Errors
     /// What the system reports.
     pub(crate) fn try_step(&mut self, system: &mut dyn HybridSystem, h: f64, x: &mut [f64]) -> Result<(), Failure> {
-        self.method.step(system, self.position.time(), h, x)
+        self.method.rehearse(system, self.position.time(), h, x)
     }
 
     /// How far the run has come, in s.
@@ -88,9 +88,15 @@ impl Stepwise {
         &self.position
     }
 
+    /// What the method remembers of earlier steps, if it does.
+    pub fn history(&self) -> Option<&History> {
+        self.method.history()
+    }
+
     /// Goes on from there.
-    pub fn restore(&mut self, position: &Position) {
+    pub fn restore(&mut self, position: &Position, history: Option<&History>) {
         self.position.clone_from(position);
+        history.into_iter().for_each(|history| self.method.restore(history));
     }
 
     /// A failure where the run stands.

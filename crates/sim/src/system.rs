@@ -41,6 +41,11 @@ pub trait System {
     /// As [`rates`](System::rates).
     fn time_derivative(&mut self, t: f64, x: &[f64], out: &mut [f64]) -> Result<(), Failure>;
 
+    /// Whether differences of the rates do where a Jacobian need not be exact, since directional derivatives take much longer.
+    fn compares_rates(&self) -> bool {
+        false
+    }
+
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 

@@ -42,15 +42,18 @@ work!(rk4_stepped: Rk4, stepped(), h = 1e-2, t = 1.0 => steps 100, rates 400, er
 work!(rk4_stepped_between: Rk4, stepped(), h = 0.125, t = 1.0 => steps 10, rates 40, error < 2e-6);
 
 work!(linearly_implicit_decay: LinearlyImplicitEuler, decay(), h = 1e-3, t = 1.0 => steps 1000, rates 1000, error < 1e-3);
+work!(linearly_implicit_bdf2_decay: LinearlyImplicitBdf2, decay(), h = 1e-3, t = 1.0 => steps 1000, rates 1001, error < 5e-6);
+work!(linearly_implicit_bdf2_oscillator: LinearlyImplicitBdf2, oscillator(), h = 1e-3, t = 10.0 => steps 10000, rates 10001, error < 1e-5);
 work!(rosenbrock_decay: Rosenbrock, decay(), h = 1e-2, t = 1.0 => steps 100, rates 300, error < 5e-8);
 work!(rosenbrock_stepped: Rosenbrock, stepped(), h = 1e-2, t = 1.0 => steps 100, rates 300, error < 1e-7);
 
-const ALL: [(FixedMethod, i32); 6] = [
+const ALL: [(FixedMethod, i32); 7] = [
     (FixedMethod::Euler, 1),
     (FixedMethod::Heun, 2),
     (FixedMethod::Rk4, 4),
     (FixedMethod::ImplicitMidpoint, 2),
     (FixedMethod::LinearlyImplicitEuler, 1),
+    (FixedMethod::LinearlyImplicitBdf2, 2),
     (FixedMethod::Rosenbrock, 3),
 ];
 
@@ -78,10 +81,48 @@ fn each_method_has_its_order() {
 /// the derivative by time is what keeps their order.
 #[test]
 fn linearly_implicit_methods_take_long_steps() {
-    for (method, bound) in [(FixedMethod::LinearlyImplicitEuler, 1e-2), (FixedMethod::Rosenbrock, 1e-5)] {
+    use FixedMethod::{LinearlyImplicitBdf2, LinearlyImplicitEuler, Rosenbrock};
+    for (method, bound) in [(LinearlyImplicitEuler, 1e-2), (LinearlyImplicitBdf2, 1e-3), (Rosenbrock, 1e-5)] {
         let coarse = error(driven(), method, 1e-2, 1.0);
         assert!(coarse < bound, "{method:?}: {coarse:e}");
     }
+}
+
+/// A time constant that shortens from 1 s to 10 µs within a second, a hundredth of the step: the Jacobian that is kept is that of
+/// some steps ago.
+#[test]
+fn a_jacobian_that_is_kept_follows_what_changes() {
+    fn hardness(t: f64) -> f64 {
+        (t * 1e5_f64.ln()).exp()
+    }
+    let mut system = Known::new(
+        &[1.0],
+        |t, x, _, dx| dx[0] = -hardness(t) * (x[0] - t.cos()) - t.sin(),
+        |t, _, v, _, jv| jv[0] = -hardness(t) * v[0],
+        |t| vec![t.cos()],
+    );
+    let (samples, end) = system.run(&options(FixedMethod::LinearlyImplicitBdf2, 1e-3, 1.0));
+    let summary = end.unwrap();
+    assert_eq!((summary.steps, summary.rates), (1000, 1001));
+    let error = system.error(&samples);
+    assert!(error < 1e-6, "{error:e}");
+}
+
+/// A step in vain moves nothing, and the run goes on as without it: there may be any number of them.
+#[test]
+fn steps_in_vain_leave_no_trace() {
+    let run = |vain: usize| {
+        let mut system = swinging();
+        let mut method = FixedStep::new(FixedMethod::LinearlyImplicitBdf2, system.sparsity());
+        let mut x = system.start.clone();
+        for step in 0..100 {
+            let t = f64::from(step) * 0.01;
+            (0..vain).for_each(|_| method.rehearse(&mut system, t, 0.01, &mut x.clone()).unwrap());
+            method.step(&mut system, t, 0.01, &mut x).unwrap();
+        }
+        x
+    };
+    assert_eq!(run(0), run(3));
 }
 
 /// A heated rod of many states: sparse matrices.
@@ -166,15 +207,15 @@ fn step_by_step_is_the_same_run() {
             for step in 1..=128 {
                 run.advance(&mut system, f64::from(step) / 64.0, &mut x).unwrap();
                 if step == 50 {
-                    saved = Some((run.position().clone(), system.clone(), x.clone()));
+                    saved = Some((run.position().clone(), run.history().cloned(), system.clone(), x.clone()));
                 }
             }
             assert_eq!(x, at_once, "{method:?}");
             let count = |s: Summary| (s.steps, s.jumps, s.crossings);
             assert_eq!(count(run.summary()), count(summary), "{method:?}");
 
-            let (position, mut system, mut x) = saved.expect("it was saved");
-            run.restore(&position);
+            let (position, history, mut system, mut x) = saved.expect("it was saved");
+            run.restore(&position, history.as_ref());
             for step in 51..=128 {
                 run.advance(&mut system, f64::from(step) / 64.0, &mut x).unwrap();
             }

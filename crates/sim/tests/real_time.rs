@@ -127,7 +127,8 @@ fn a_failure_stops_it_with_its_time() {
 
 #[test]
 fn a_tick_takes_no_memory() {
-    for method in [FixedMethod::Heun, FixedMethod::ImplicitMidpoint, FixedMethod::Rosenbrock] {
+    use FixedMethod::{Heun, ImplicitMidpoint, LinearlyImplicitBdf2, Rosenbrock};
+    for method in [Heun, ImplicitMidpoint, Rosenbrock, LinearlyImplicitBdf2] {
         let count = |ticks: u64| {
             let mut system = decay();
             system.accepted = Vec::with_capacity(10_000);

@@ -53,6 +53,10 @@ impl Net {
 }
 
 impl System for Net {
+    /// So that both ways are taken in these tests.
+    fn compares_rates(&self) -> bool {
+        true
+    }
     fn states(&self) -> usize {
         self.capacities.len()
     }
@@ -117,16 +121,23 @@ fn end(net: &mut Net, method: Method) -> Vec<f64> {
     samples.values.pop().expect("the end")
 }
 
+const IMPLICIT: [FixedMethod; 4] = [
+    FixedMethod::ImplicitMidpoint,
+    FixedMethod::LinearlyImplicitEuler,
+    FixedMethod::LinearlyImplicitBdf2,
+    FixedMethod::Rosenbrock,
+];
+
 #[test]
 fn every_implicit_method_gives_what_it_gives_with_dense_matrices() {
-    let fixed = [FixedMethod::ImplicitMidpoint, FixedMethod::LinearlyImplicitEuler, FixedMethod::Rosenbrock];
-    let methods = fixed.map(Method::Fixed).into_iter().chain([Method::Bdf, Method::Radau, Method::Auto]);
+    let methods = IMPLICIT.map(Method::Fixed).into_iter().chain([Method::Bdf, Method::Radau, Method::Auto]);
     for (number, method) in methods.enumerate() {
         let seed = 11.0 + number as f64;
         let (sparse, dense) = (end(&mut Net::new(80, seed, false), method), end(&mut Net::new(80, seed, true), method));
         for (a, b) in sparse.iter().zip(&dense) {
-            // The same steps, but for rounding; volts between 0 and 1.
-            assert!((a - b).abs() < 1e-9, "{method:?}: {a} {b}");
+            // The same steps, but for rounding; where a Jacobian is kept its columns are not of the same age. Volts between 0 and 1.
+            let close = if method == Method::Fixed(FixedMethod::LinearlyImplicitBdf2) { 1e-6 } else { 1e-9 };
+            assert!((a - b).abs() < close, "{method:?}: {a} {b}");
             assert!(*a > -1e-6 && *a < 1.0 + 1e-6, "what the source gives bounds all efforts: {a}");
         }
     }
@@ -134,7 +145,7 @@ fn every_implicit_method_gives_what_it_gives_with_dense_matrices() {
 
 #[test]
 fn a_sparse_implicit_step_takes_no_memory() {
-    for method in [FixedMethod::ImplicitMidpoint, FixedMethod::LinearlyImplicitEuler, FixedMethod::Rosenbrock] {
+    for method in IMPLICIT {
         let mut net = Net::new(200, 3.0, false);
         let (mut steps, mut x) = (FixedStep::new(method, &net.sparsity.clone()), vec![0.0; 200]);
         let taken = allocation_counter::measure(|| {

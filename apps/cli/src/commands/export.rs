@@ -51,6 +51,7 @@ fn asked(arguments: &arguments::Export) -> Export {
             FixedSolver::Rk4 => FixedMethod::Rk4,
             FixedSolver::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
             FixedSolver::LinearlyImplicitEuler => FixedMethod::LinearlyImplicitEuler,
+            FixedSolver::LinearlyImplicitBdf2 => FixedMethod::LinearlyImplicitBdf2,
             FixedSolver::Rosenbrock => FixedMethod::Rosenbrock,
         },
         step: arguments.step,

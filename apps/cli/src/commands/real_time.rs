@@ -57,7 +57,7 @@ pub fn run(arguments: &RunArguments) -> u8 {
 fn asked(arguments: &RunArguments) -> Result<RealTimeRun, Problem> {
     let bad = |reason: String| Problem::BadOption { reason };
     let Method::Fixed(method) = method(arguments.solver) else {
-        return Err(bad("a run against the clock needs a method with fixed step: euler, heun, rk4, implicit_midpoint, linearly_implicit_euler or rosenbrock".into()));
+        return Err(bad("a run against the clock needs a method with fixed step: euler, heun, rk4, implicit_midpoint, linearly_implicit_euler, linearly_implicit_bdf2 or rosenbrock".into()));
     };
     let rate = frequency(&arguments.rate)
         .ok_or_else(|| bad(format!("`{}` is no frequency: write `1kHz`, `500 Hz` or `500`", arguments.rate)))?;

@@ -121,6 +121,7 @@ pub(super) fn method(solver: Solver) -> Method {
         Solver::Rk4 => Method::Fixed(FixedMethod::Rk4),
         Solver::ImplicitMidpoint => Method::Fixed(FixedMethod::ImplicitMidpoint),
         Solver::LinearlyImplicitEuler => Method::Fixed(FixedMethod::LinearlyImplicitEuler),
+        Solver::LinearlyImplicitBdf2 => Method::Fixed(FixedMethod::LinearlyImplicitBdf2),
         Solver::Rosenbrock => Method::Fixed(FixedMethod::Rosenbrock),
     }
 }

@@ -50,10 +50,12 @@ if TYPE_CHECKING:
     import pandas
 
 Form: TypeAlias = Literal["minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff"]
-FixedMethod: TypeAlias = Literal["euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock"]
+FixedMethod: TypeAlias = Literal[
+    "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "linearly-implicit-bdf2", "rosenbrock",
+]  # fmt: skip
 Method: TypeAlias = Literal[
     "auto", "explicit", "bdf", "radau",
-    "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock",
+    "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "linearly-implicit-bdf2", "rosenbrock",
 ]  # fmt: skip
 Target: TypeAlias = Literal["c", "fmu2", "fmu3", "casadi", "latex"]
 Stage: TypeAlias = Literal["ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program"]
@@ -62,7 +64,9 @@ Value: TypeAlias = float | str
 """A value of a parameter: a number in SI units, or text with a unit such as ``"20 kN/m"``."""
 
 _FORMS = ("minimal", "kane", "inverted", "break", "relaxed", "lagrange", "stiff")
-_FIXED = ("euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "rosenbrock")
+_FIXED = (
+    "euler", "heun", "rk4", "implicit-midpoint", "linearly-implicit-euler", "linearly-implicit-bdf2", "rosenbrock",
+)  # fmt: skip
 _METHODS = ("auto", "explicit", "bdf", "radau", *_FIXED)
 _TARGETS = {"c": "", "fmu2": ".fmu", "fmu3": ".fmu", "casadi": ".py", "latex": ".tex"}
 _STAGES = ("ast", "bond_graph", "causal_graph", "causal_paths", "equations", "program")
@@ -383,7 +387,8 @@ class Model:
             every: Time between samples in s; nothing: every step.
             at: Times of the samples in s, ascending, in the place of these; the end is sampled too.
             method: ``auto``, ``explicit``, ``bdf`` or ``radau`` with steps of variable length; ``euler``, ``heun``, ``rk4``,
-                ``implicit-midpoint``, ``linearly-implicit-euler`` or ``rosenbrock`` with steps of fixed length.
+                ``implicit-midpoint``, ``linearly-implicit-euler``, ``linearly-implicit-bdf2`` or ``rosenbrock`` with steps of
+                fixed length.
             step: Step of a method with fixed step in s, longest step of the others.
             rtol: Relative error allowed in a step.
             atol: Absolute error allowed in a step, in the unit of each state; nothing: scaled to each state.

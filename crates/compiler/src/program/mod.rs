@@ -306,10 +306,19 @@ pub struct Observed {
     pub default: bool,
 }
 
+/// Values of a program beyond which it is long.
+const LONG: usize = 10_000;
+
 impl Program {
     /// Number of unknowns of the start: states, then conserved constants, then positions.
     pub fn start_unknowns(&self) -> usize {
         self.states.len() + self.conserved.len() + self.positions.len()
+    }
+
+    /// Whether code for its derivatives is so long that it has left the caches of a processor when it runs again: then differences
+    /// of rates, whose code has just run, take a tenth of the time (measured on cars of 20,000 values and more).
+    pub fn is_long(&self) -> bool {
+        self.values.len() > LONG
     }
 
     /// The parameter that is this, by its number, if there is one.

@@ -103,6 +103,10 @@ flags! {
     derivatives
     /// Derivatives of the rates by time.
     time_derivative
+    /// Steps go on from what is kept of earlier ones.
+    keeps_steps
+    /// They compare rates in place of exact derivatives.
+    compares_rates
     time_passes
     /// Linear blocks with a constant matrix.
     linear_constant
@@ -115,7 +119,7 @@ flags! {
     solves_start
     guesses
     start_groups
-    /// Events may change states: clauses, or modes. Of FMUs alone.
+    /// Events may change states: clauses, or modes.
     moves
     /// Several modes.
     modes

@@ -135,6 +135,9 @@ pub fn write(export: &Export) -> Result<Written, EmitError> {
     if !(export.step > 0.0 && export.step.is_finite()) {
         return Err(EmitError::Step(export.step));
     }
+    if export.real == Real::Float && export.method.keeps_steps() {
+        return Err(EmitError::SingleDifferences);
+    }
     range::check(export)?;
     let program = export.program;
     let in_modes = export.has_modes();

@@ -209,6 +209,7 @@ impl Exported {
             Method::Rk4 => FixedMethod::Rk4,
             Method::ImplicitMidpoint => FixedMethod::ImplicitMidpoint,
             Method::LinearlyImplicitEuler => FixedMethod::LinearlyImplicitEuler,
+            Method::LinearlyImplicitBdf2 => FixedMethod::LinearlyImplicitBdf2,
             Method::Rosenbrock => FixedMethod::Rosenbrock,
         }
     }

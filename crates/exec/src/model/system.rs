@@ -204,6 +204,10 @@ impl System for Model {
         self.derivative_along(t, x, out)
     }
 
+    fn compares_rates(&self) -> bool {
+        self.code.program.is_long()
+    }
+
     fn sparsity(&self) -> &Sparsity {
         &self.code.sparsity
     }

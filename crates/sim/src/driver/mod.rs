@@ -201,6 +201,9 @@ impl<'a> Run<'a> {
         if let StopReason::TimeEvent { corner } = reason {
             stepper.after_event(corner, point);
         }
+        if reason != StopReason::StepEnd {
+            stepper.after_change();
+        }
         let exchanged = self.exchange(&mut *stepper.events(), point, false)?;
         Ok(if exchanged { StopReason::Exchange } else { reason })
     }

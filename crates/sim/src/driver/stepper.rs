@@ -28,7 +28,7 @@ pub(crate) enum Flow {
 ///
 /// The driver calls [`begin_interval`](Stepper::begin_interval) where the run stands, then for each step `step`, `accept`
 /// (or `accept_crossing` at a zero crossing inside it), the events' own functions, `before_event` and `after_event` around a
-/// time event, and `supervise`.
+/// time event, `after_change` after whatever has happened there, and `supervise`.
 pub(crate) trait Stepper {
     /// Whether the solution is known inside a step. Then zero crossings are located and samples are taken there. Without it
     /// a step ends at the next sample, and a zero crossing counts from the end of the step in which it lies, unless
@@ -99,6 +99,9 @@ pub(crate) trait Stepper {
     fn after_event(&mut self, corner: bool, point: &[f64]) {
         let _ = (corner, point);
     }
+
+    /// Something has happened where the last step ended.
+    fn after_change(&mut self) {}
 
     /// What was known of the last event holds no longer.
     fn forget(&mut self) {}

@@ -62,23 +62,19 @@ impl StepMatrix {
         factor: f64,
         mut see: impl FnMut(usize, usize, f64),
     ) -> Result<(), Failure> {
-        let singular = |state: Option<usize>, system: &dyn System| Failure::Singular {
-            time: t,
-            what: state.map_or("the step".into(), |state| format!("the step of {}", system.state_name(state))),
-        };
         let (block, transposed) = (self.block, self.transposed);
         match &mut self.factors {
             Factors::Dense(matrix) if transposed => {
                 matrix.set_unit();
                 self.jacobian.visit(system, t, x, |row, column, _, value| matrix.add(column, row, -factor * value))?;
-                matrix.factor().map_err(|column| singular(Some(column), system))
+                matrix.factor().map_err(|column| singular(t, Some(column), system))
             }
             Factors::Sparse(sparse) if transposed => {
                 sparse.set_unit();
                 self.jacobian.visit(system, t, x, |row, column, _, value| {
                     sparse.add_at((column, row), -factor * value);
                 })?;
-                sparse.lu.factor().then_some(()).ok_or_else(|| singular(None, system))
+                sparse.lu.factor().then_some(()).ok_or_else(|| singular(t, None, system))
             }
             Factors::Dense(matrix) => {
                 matrix.set_unit();
@@ -88,7 +84,7 @@ impl StepMatrix {
                     }
                     see(row, column, value);
                 })?;
-                matrix.factor().map_err(|column| singular(Some(column), system))
+                matrix.factor().map_err(|column| singular(t, Some(column), system))
             }
             Factors::Sparse(sparse) => {
                 sparse.set_unit();
@@ -98,7 +94,33 @@ impl StepMatrix {
                     }
                     see(row, column, value);
                 })?;
-                sparse.lu.factor().then_some(()).ok_or_else(|| singular(None, system))
+                sparse.lu.factor().then_some(()).ok_or_else(|| singular(t, None, system))
+            }
+        }
+    }
+
+    /// Factors the matrix for a Jacobian with these nonzeros, in the order of its pattern.
+    ///
+    /// # Errors
+    /// No pivot is left.
+    pub(super) fn factor_values(
+        &mut self,
+        system: &dyn System,
+        t: f64,
+        values: &[f64],
+        factor: f64,
+    ) -> Result<(), Failure> {
+        match &mut self.factors {
+            Factors::Dense(matrix) => {
+                matrix.set_unit();
+                let entries = system.sparsity().entries().zip(values);
+                entries.for_each(|((row, column), value)| matrix.add(row, column, -factor * value));
+                matrix.factor().map_err(|column| singular(t, Some(column), system))
+            }
+            Factors::Sparse(sparse) => {
+                sparse.set_unit();
+                values.iter().enumerate().for_each(|(place, value)| sparse.add(place, -factor * value));
+                sparse.lu.factor().then_some(()).ok_or_else(|| singular(t, None, system))
             }
         }
     }
@@ -112,6 +134,12 @@ impl StepMatrix {
             }
         }
     }
+}
+
+/// No pivot is left for a state, or for one that is not known.
+fn singular(time: f64, state: Option<usize>, system: &dyn System) -> Failure {
+    let what = state.map_or("the step".into(), |state| format!("the step of {}", system.state_name(state)));
+    Failure::Singular { time, what }
 }
 
 /// A sparse matrix and its factors.

@@ -6,6 +6,7 @@
 //! shorter steps from the same start, in a number of them that is bounded.
 
 mod back;
+mod bdf2;
 mod implicit_midpoint;
 mod matrix;
 mod rosenbrock;
@@ -13,6 +14,8 @@ mod ticks;
 
 use crate::{Affected, Failure, Sparsity, System};
 pub use back::StepBack;
+pub use bdf2::History;
+use bdf2::LinearlyImplicitBdf2;
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 pub(crate) use ticks::{Ticks, target};
@@ -31,6 +34,10 @@ pub enum FixedMethod {
     ImplicitMidpoint,
     /// Linearly implicit Euler: order 1, L-stable. 1 evaluation, 1 Jacobian, 1 factorisation a step, no iteration.
     LinearlyImplicitEuler,
+    /// Linearly implicit BDF of two steps: order 2, L-stable where the Jacobian changes slowly, which is kept and found anew a
+    /// few columns at a time. 1 evaluation and 1 solution a step; every 8 steps 1 directional derivative, or another evaluation,
+    /// and 1 factorisation.
+    LinearlyImplicitBdf2,
     /// The Rosenbrock method RODAS3: order 3, L-stable, for stiff systems in real time. 3 evaluations, 1 Jacobian,
     /// 1 factorisation and 4 solutions a step, no iteration.
     Rosenbrock,
@@ -41,7 +48,7 @@ impl FixedMethod {
     pub fn evaluations(self) -> f64 {
         match self {
             FixedMethod::Euler => 1.0,
-            FixedMethod::Heun => 2.0,
+            FixedMethod::Heun | FixedMethod::LinearlyImplicitBdf2 => 2.0,
             _ => 4.0,
         }
     }
@@ -64,6 +71,7 @@ pub struct FixedStep {
 enum Implicit {
     Midpoint(ImplicitMidpoint),
     Linearly(LinearlyImplicit),
+    Bdf2(Box<LinearlyImplicitBdf2>),
 }
 
 /// An explicit Runge-Kutta method without needless stages.
@@ -90,7 +98,10 @@ impl FixedMethod {
             FixedMethod::Euler => Some(&EULER),
             FixedMethod::Heun => Some(&HEUN),
             FixedMethod::Rk4 => Some(&RK4),
-            FixedMethod::ImplicitMidpoint | FixedMethod::LinearlyImplicitEuler | FixedMethod::Rosenbrock => None,
+            FixedMethod::ImplicitMidpoint
+            | FixedMethod::LinearlyImplicitEuler
+            | FixedMethod::LinearlyImplicitBdf2
+            | FixedMethod::Rosenbrock => None,
         }
     }
 
@@ -100,6 +111,7 @@ impl FixedMethod {
             FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4 => None,
             FixedMethod::ImplicitMidpoint => Some(Implicit::Midpoint(ImplicitMidpoint::new(sparsity, blocks))),
             FixedMethod::LinearlyImplicitEuler => Some(linearly(&LINEARLY_IMPLICIT_EULER)),
+            FixedMethod::LinearlyImplicitBdf2 => Some(Implicit::Bdf2(Box::new(LinearlyImplicitBdf2::new(sparsity)))),
             FixedMethod::Rosenbrock => Some(linearly(&RODAS3)),
         }
     }
@@ -133,6 +145,40 @@ impl FixedStep {
         Ok(())
     }
 
+    /// A step in vain, so that what it takes is at hand; of a method that remembers steps about what it would take. Nothing is
+    /// moved but `x`.
+    ///
+    /// # Errors
+    /// As [`step`](FixedStep::step).
+    pub fn rehearse(&mut self, system: &mut dyn System, t: f64, h: f64, x: &mut [f64]) -> Result<(), Failure> {
+        match &mut self.implicit {
+            Some(Implicit::Bdf2(method)) => method.rehearse(system, t, x, &mut self.trial),
+            _ => self.step(system, t, h, x),
+        }
+    }
+
+    /// Something happens where the run stands: what the method remembers of earlier steps tells nothing of what comes.
+    pub fn leave(&mut self) {
+        if let Some(Implicit::Bdf2(method)) = &mut self.implicit {
+            method.leave();
+        }
+    }
+
+    /// What the method remembers of earlier steps, if it does.
+    pub fn history(&self) -> Option<&History> {
+        match &self.implicit {
+            Some(Implicit::Bdf2(method)) => Some(method.history()),
+            _ => None,
+        }
+    }
+
+    /// Goes on as it would have gone on there.
+    pub fn restore(&mut self, history: &History) {
+        if let Some(Implicit::Bdf2(method)) = &mut self.implicit {
+            method.restore(history);
+        }
+    }
+
     /// The state where the last step ended.
     pub(crate) fn advanced(&self) -> &[f64] {
         &self.trial
@@ -149,6 +195,7 @@ impl FixedStep {
             (Some(tableau), _) => self.explicit(tableau, system, t, h, x)?,
             (None, Some(Implicit::Midpoint(midpoint))) => midpoint.step(system, t, h, x, &mut self.trial)?,
             (None, Some(Implicit::Linearly(method))) => method.step(system, t, h, x, &mut self.trial)?,
+            (None, Some(Implicit::Bdf2(method))) => method.step(system, t, h, x, &mut self.trial)?,
             (None, None) => {}
         }
         self.check(system, t + h)

@@ -98,6 +98,9 @@ impl Stepper for Ticks<'_, '_> {
     fn accept(&mut self, _: f64, x: &mut [f64]) {
         x.copy_from_slice(self.method.advanced());
     }
+    fn after_change(&mut self) {
+        self.method.leave();
+    }
     /// Never asked for: there is no dense output.
     fn interpolate(&mut self, _: f64, _: &mut [f64]) {}
 }

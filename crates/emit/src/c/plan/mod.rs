@@ -235,7 +235,7 @@ impl<'a> Plan<'a> {
         }
         let directional = Moving { inputs: self.export.derivatives, states: true, ..Moving::default() };
         functions.extend(along(&mut writer, "ha_rates_along", ALONG, &routines.rates, directional));
-        if self.export.method.is_linearly_implicit() {
+        if self.export.method.takes_time_derivative() {
             let time_derivative = Moving { time: Some(TimeRate::OfDirection), held: true, ..Moving::default() };
             functions.extend(along(&mut writer, "ha_rates_by_time", ALONG, &routines.rates, time_derivative));
         }
@@ -339,7 +339,13 @@ impl<'a> Plan<'a> {
 
     /// Whether the rates have a function for their derivatives.
     pub fn has_directional_derivative(&self) -> bool {
-        self.export.derivatives || self.export.method.is_implicit()
+        let method = self.export.method;
+        self.export.derivatives || method.takes_derivatives() || (method.keeps_steps() && !self.compares_rates())
+    }
+
+    /// Whether steps compare rates in place of exact derivatives.
+    pub fn compares_rates(&self) -> bool {
+        self.export.method.keeps_steps() && self.program.is_long()
     }
 }
 

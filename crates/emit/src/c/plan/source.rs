@@ -109,7 +109,8 @@ impl Plan<'_> {
         put(filling.fragments(include_str!("../runtime/advance.c")));
         put(filling.fragments(match self.export.method {
             Method::ImplicitMidpoint => include_str!("../runtime/midpoint.c"),
-            method if method.is_linearly_implicit() => include_str!("../runtime/rosenbrock.c"),
+            method if method.keeps_steps() => include_str!("../runtime/bdf2.c"),
+            method if method.takes_time_derivative() => include_str!("../runtime/rosenbrock.c"),
             _ => include_str!("../runtime/explicit.c"),
         }));
         if !self.relations().is_empty() {
@@ -131,7 +132,7 @@ impl Plan<'_> {
         let mode = self.mode.as_ref();
         let bounds = mode.filter(|mode| mode.has_laws());
         let held = !(self.delays.is_empty() && self.samples.is_empty());
-        let time_derivative = export.method.is_linearly_implicit();
+        let time_derivative = export.method.takes_time_derivative();
         let few = |n: usize| export.real == Real::Double && p.blocks.values().any(|block| block.size() == n);
         let always = |d: &LawDomain| p.values.reads(d.argument) == Reads::PARAMETERS;
         Flags {
@@ -183,6 +184,8 @@ impl Plan<'_> {
             directional_derivative: self.has_directional_derivative(),
             derivatives: export.derivatives,
             time_derivative,
+            keeps_steps: export.method.keeps_steps(),
+            compares_rates: self.compares_rates(),
             time_passes: time_derivative || held || bounds.is_some(),
             moves: !p.clauses.is_empty() || mode.is_some(),
             modes: mode.is_some(),

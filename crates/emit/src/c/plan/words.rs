@@ -92,6 +92,7 @@ impl Plan<'_> {
             ("GROUP_STARTS", lines(lengths(&groups))),
             ("GROUP_COLUMNS", lines(flat(&groups))),
             ("GROUPS", groups.len().to_string()),
+            ("NONZEROS", columns.iter().map(Vec::len).sum::<usize>().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),
             ("COLUMN_ROWS", lines(flat(&columns))),
             ("SCALES", real.numbers(&self.export.start.scales)),
@@ -316,31 +317,34 @@ impl Plan<'_> {
 }
 
 /// What counts as rounding: after a few operations, beside other entries of a column, beside the greatest singular value, of
-/// residuals in units of their own; how far beside a point is another one; the least damping of Newton's method at a start; and
+/// residuals in units of their own; how far beside a point is another one, of which rates are compared, and along the rates in
+/// steps; the least damping of Newton's method at a start; and
 /// what a solution in a fixed order may leave of an equation; how near to a singular position rates are rounding.
-fn tolerances(real: Real) -> [(&'static str, String); 8] {
+fn tolerances(real: Real) -> [(&'static str, String); 10] {
     let words = [
         "CLOSE_TO_ROUNDING",
         "ROUNDING_OF_ENTRIES",
         "ROUNDING_OF_RANK",
         "BORROWED_ROUNDING",
         "BESIDE",
+        "HALF_OF_DIGITS",
+        "ALONG_RATES",
         "LEAST_DAMPING",
         "LEFT_OVER",
         "CLOSE_TO_SINGULAR",
     ];
     // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1e-12, 1e-10, 1e-7],
-        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 1e-6, 1e-4, 3e-4],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1.0 / (1 << 26) as f64, 1e-6, 1e-12, 1e-10, 1e-7],
+        Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 3e-4, 0.3, 1e-6, 1e-4, 3e-4],
     };
-    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (words[i], real.number(values[i])))
+    [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| (words[i], real.number(values[i])))
 }
 
 /// Nodes, and the weights of each stage and of the step.
 fn tableau(method: Method, real: Real) -> (String, String) {
     let (nodes, weights): (&[f64], Vec<Vec<f64>>) = match method {
-        Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler => {
+        Method::Euler | Method::ImplicitMidpoint | Method::LinearlyImplicitEuler | Method::LinearlyImplicitBdf2 => {
             (&[0.0], vec![vec![0.0], vec![1.0]])
         }
         Method::Heun => (&[0.0, 1.0], vec![vec![0.0; 2], vec![1.0, 0.0], vec![0.5, 0.5]]),

@@ -58,6 +58,17 @@ impl Plan<'_> {
                 all.operations += self.step_elimination(stages) + stages * (2 * stages + 4) * n;
                 all
             }
+            // At the beginning, and where an event changes all of the Jacobian.
+            Method::LinearlyImplicitBdf2 => {
+                let nonzeros = self.columns().iter().map(|rows| rows.len() as u64).sum::<u64>();
+                let parts = self.column_groups().len() as u64 + 1;
+                let mut all = match self.compares_rates() {
+                    true => w.rates.clone() * (parts + 2),
+                    false => w.rates.clone() * 2 + w.directional.clone() * parts,
+                };
+                all.operations += self.step_elimination(1) + 5 * nonzeros + 30 * n;
+                all
+            }
             _ => {
                 let stages = method.stages() as u64;
                 let mut all = w.rates.clone() * stages;

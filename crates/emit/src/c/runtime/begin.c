@@ -58,6 +58,10 @@ int $model_start_from($model *m, double t, const $real *x)
         $ha_copy(m->x, x, HA_NX);
     }
     $ha_ticks_from(m, t);
+//if keeps_steps
+    m->before_length = $1.0;
+    $ha_forget_steps(m);
+//end
 //if single
     $ha_fill(m->rest, $0.0, HA_NX);
 //end

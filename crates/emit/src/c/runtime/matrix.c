@@ -1,6 +1,28 @@
 //section
 /* ---- the matrix of an implicit step ---- */
 
+//if bounds
+//item ha_known_size
+/* A typical magnitude of a state; 0 where none is known. */
+static $real ha_known_size(const ha_model *m, int i)
+{
+    return i < HA_TRACKED ? m->most_values[$ha_tracked[i]] : $0.0;
+}
+
+//else
+//item ha_scales
+static const $real ha_scales[] = {
+$SCALES
+};
+//item ha_known_size
+/* A typical magnitude of a state; 0 where none is known. */
+static $real ha_known_size(const ha_model *m, int i)
+{
+    (void)m;
+    return $ha_scales[i];
+}
+
+//end
 //item ha_group_starts
 /* Columns of the Jacobian in groups: no two of a group have a nonzero in the same row. */
 static const int ha_group_starts[] = {

@@ -2,12 +2,6 @@
 //section
 /* ---- the implicit midpoint rule: Newton with the exact Jacobian ---- */
 
-//item ha_scales
-/* Typical magnitudes of the states. */
-static const $real ha_scales[] = {
-$SCALES
-};
-
 //item ha_correct
 /* One Newton iteration on the midpoint. */
 static int ha_correct(ha_model *m, double t, $real half, const $real *x)
@@ -56,12 +50,7 @@ static $real ha_relative_correction(const ha_model *m)
     $real most = $0.0;
     int i;
     for (i = 0; i < HA_NX; ++i) {
-//if bounds
-        const $real known = i < HA_TRACKED ? m->most_values[$ha_tracked[i]] : $0.0;
-        const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), known);
-//else
-        const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), $ha_scales[i]);
-//end
+        const $real size = $ha_max($ha_max($fabs(m->middle[i]), m->sizes[i]), $ha_known_size(m, i));
         const $real relative = m->correction[i] == $0.0 ? $0.0 : $fabs(m->correction[i]) / size;
         if (relative > most || relative != relative) {
             most = relative;

@@ -435,6 +435,10 @@ static int ha_go_on_from(ha_model *m, double t, $real *x)
     m->failure.code = $MODEL_OK;
     if ($ha_exchange(m, t, x, 1, &exchanged) != $MODEL_OK || !exchanged || $ha_hold_sides(m, t, x) != $MODEL_OK) {
         m->failure = failure;
+//if keeps_steps
+    } else {
+        $ha_forget_steps(m);
+//end
     }
     return m->failure.code;
 }
@@ -482,6 +486,9 @@ int $model_go_on($model *m, double t, $real *x)
 //end
     if (status == $MODEL_OK && m->switched) {
         status = $ha_hold_sides(m, t, x);
+//if keeps_steps
+        $ha_forget_steps(m);
+//end
     }
     m->switched = 0;
     return status;

@@ -361,11 +361,17 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     }
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $ha_cross_keeping(m, end, m->x);
+//if keeps_steps
+        $ha_leave_steps(m);
+//end
     }
 //else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
+//if keeps_steps
+        $ha_leave_steps(m);
+//end
     }
 //end
     return status;
@@ -400,11 +406,17 @@ static int ha_step_to(ha_model *m, double target, int jumps)
     }
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $ha_cross_keeping(m, end, m->x);
+//if keeps_steps
+        $ha_leave_steps(m);
+//end
     }
 //else
     status = $model_accept(m, end, m->x);
     if (status == $MODEL_OK && (switched || (jumps && end == target))) {
         status = $model_cross(m, end, m->x);
+//if keeps_steps
+        $ha_leave_steps(m);
+//end
     }
 //end
     return status;

@@ -273,16 +273,13 @@ int $model_directional($model *m, double t, const $real *x, const $real *v, cons
 
 //end
 //if switches
-//public $model_indicators
-int $model_indicators($model *m, double t, const $real *x, $real *g)
+//item ha_indicators_of_operands
+/* Event indicators, of the operands of conditions at t. */
+static void ha_indicators_of_operands(ha_model *m, double t, $real *g)
 {
     static const int conditions[] = {$SWITCH_CONDITIONS};
-    const int status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
     int next = 0;
     int i;
-    if (status != $MODEL_OK) {
-        return status;
-    }
     for (i = 0; i < $SWITCHES; ++i) {
         double low;
         double high;
@@ -320,7 +317,16 @@ int $model_indicators($model *m, double t, const $real *x, $real *g)
     /* Other modes have more of them. */
     $ha_fill(g + HA_NG, $1.0, $MODEL_INDICATORS - HA_NG);
 //end
-    return $MODEL_OK;
+}
+
+//public $model_indicators
+int $model_indicators($model *m, double t, const $real *x, $real *g)
+{
+    const int status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
+    if (status == $MODEL_OK) {
+        $ha_indicators_of_operands(m, t, g);
+    }
+    return status;
 }
 
 //item ha_take_sides
