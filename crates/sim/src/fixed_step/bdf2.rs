@@ -3,22 +3,30 @@
 //! With `f = A x + (f - A x)`, whatever the matrix `A`, the first part is taken by the backward differentiation formula of
 //! order 2, and the second is extrapolated to the end of the step. For the move `d` of the last step, `ω` times as short as
 //! this one, and its rates `f₋`, the end is `x + ω d + e` with `(a I - h A) e = h ((1 + ω) f - ω f₋) - ω d` and
-//! `a = (1 + 2 ω) / (1 + ω)`: order 2 for any `A`, L-stable where `A` is the Jacobian. The linearly implicit
-//! Euler method begins, with the rates at the end of the step and the state at its beginning. Source: [Ascher], SBDF.
+//! `a = (1 + 2 ω) / (1 + ω)`: order 2 for any `A`, L-stable where `A` is the Jacobian. Source: [Ascher], SBDF.
+//! A method of one step and two stages begins, of order 2 for any `A` too; where a solution turns sharply it is its first stage
+//! alone, linearly implicit Euler. Source: [HundsdorferVerwer], IV.5, ROS2 with `γ = 1`, the derivative by time as a difference.
 //!
-//! So `A` need not be new, nor exact. It is the Jacobian of the first step, of which one group of columns is found anew every
-//! [`STEPS_A_PART`] steps. Where an event changes it along the way of the run so much that steps would swing up, all of it is.
+//! So `A` need not be new, nor exact. It is the Jacobian of the first step, until it is another one along the way of the run, by so
+//! much that steps would swing up. That is looked at every [`STEPS_A_LOOK`] steps, after an event, and where a step goes far from
+//! where it was expected, which then is made from there anew. All of it is found anew at once: columns of different age would
+//! lead a machine that moves in a plane out of it.
 //! Systems whose derivatives take long have it by [differences](System::compares_rates) of their rates: one evaluation more,
 //! by code that has just run.
 
 use super::matrix::StepMatrix;
 use crate::{Failure, Sparsity, System};
 
-/// Steps from one group of columns of the Jacobian that is found anew to the next.
-const STEPS_A_PART: u32 = 8;
+/// Steps from one look at whether the Jacobian is still that of the way to the next.
+const STEPS_A_LOOK: u32 = 8;
 
-/// By how much at most a step may be longer than the one before: the formula is stable up to 1 + √2.
-const LONGEST: f64 = 2.0;
+/// By how much at most a step may be longer than the one before. The formula is stable up to 1 + √2 where each is; a short one
+/// between long ones, up to a sample, does not swing.
+const LONGEST: f64 = 20.0;
+
+/// A step is doubted whose move is another one than that before by so many times that, and by this part of a state.
+const OTHER: f64 = 2.0;
+const MUCH: f64 = 0.1;
 
 /// Part of a step that is rounding: what is not further apart is the same time, or the same length.
 const ROUNDING: f64 = 1e-9;
@@ -27,11 +35,12 @@ const ROUNDING: f64 = 1e-9;
 const CHANGED: f64 = 0.5;
 const SEEN: f64 = 0.01;
 
-/// Parts of a state, and of a step along the rates, over which rates are compared: half of the digits. And the size of a state
-/// that is not known, at least.
-const BESIDE: f64 = 1.0 / (1 << 26) as f64;
+/// Parts of a state, and of a move, over which rates are compared: a matrix that serves steps needs few digits, and what is 0 in it
+/// but for rounding is to stay small, or a car that goes straight on leaves its plane. And the size of a state that is not known,
+/// at least.
+const BESIDE: f64 = 1.0 / (1 << 12) as f64;
 const UNKNOWN: f64 = 1e-4;
-const ALONG: f64 = 1e-6;
+const ALONG: f64 = 1e-2;
 
 /// What is remembered of earlier steps.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,8 +52,7 @@ pub struct History {
     jacobian: Vec<f64>,
     /// What it was multiplied by in the matrix that was factored last; not a number where it is to be factored anew.
     scale: f64,
-    /// The group of columns that is found anew next, and steps since the last one.
-    part: usize,
+    /// Steps since it was looked at last.
     steps: u32,
     /// Whether something has happened since the last step.
     event: bool,
@@ -81,6 +89,7 @@ pub(super) struct LinearlyImplicitBdf2 {
     factored: bool,
     point: Vec<f64>,
     rates: Vec<f64>,
+    way: Vec<f64>,
     move_on: Vec<f64>,
 }
 
@@ -90,13 +99,14 @@ impl LinearlyImplicitBdf2 {
         let (before, last) = (Step::none(states), Step::none(states));
         let jacobian = Vec::with_capacity(sparsity.nonzeros());
         LinearlyImplicitBdf2 {
-            history: History { before, last, jacobian, scale: f64::NAN, part: 0, steps: 0, event: false },
+            history: History { before, last, jacobian, scale: f64::NAN, steps: 0, event: false },
             groups: sparsity.groups(),
             sparsity: sparsity.clone(),
             matrix: StepMatrix::new(sparsity, 1),
             factored: false,
             point: vec![0.0; states],
             rates: vec![0.0; states],
+            way: vec![0.0; states],
             move_on: vec![0.0; states],
         }
     }
@@ -143,7 +153,14 @@ impl LinearlyImplicitBdf2 {
         Ok(())
     }
 
-    /// The same without a trace, apart from the end.
+    /// Finds the Jacobian where a run begins, so that the first step does not.
+    pub(super) fn prepare(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> Result<(), Failure> {
+        system.rates(t, x, &mut self.history.last.rates)?;
+        self.renew(system, (t, h), x, false);
+        Ok(())
+    }
+
+    /// A step without a trace, apart from the end.
     pub(super) fn rehearse(
         &mut self,
         system: &mut dyn System,
@@ -159,21 +176,24 @@ impl LinearlyImplicitBdf2 {
         Ok(())
     }
 
-    /// Finds anew what is due of the Jacobian.
+    /// Finds the Jacobian anew where it is due.
     fn renew(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64], goes_on: bool) {
         let event = std::mem::take(&mut self.history.event);
-        if self.history.jacobian.is_empty() || (event && self.is_another(system, (t, h), x)) {
-            self.history.jacobian.resize(self.sparsity.nonzeros(), 0.0);
-            (0..self.groups.len()).for_each(|part| self.take_part(system, (t, h), x, part));
-            (self.history.part, self.history.steps) = (0, 0);
-        } else if goes_on {
-            self.history.steps += 1;
-            if self.history.steps == STEPS_A_PART {
-                self.take_part(system, (t, h), x, self.history.part);
-                let next = self.history.part + 1;
-                (self.history.part, self.history.steps) = (if next < self.groups.len() { next } else { 0 }, 0);
-            }
+        self.history.steps += u32::from(goes_on);
+        let History { jacobian, steps, .. } = &self.history;
+        let looks = event || *steps >= STEPS_A_LOOK;
+        if jacobian.is_empty() || (looks && self.is_another(system, (t, h), x)) {
+            self.take_all(system, (t, h), x);
         }
+        if looks {
+            self.history.steps = 0;
+        }
+    }
+
+    fn take_all(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
+        self.history.jacobian.resize(self.sparsity.nonzeros(), 0.0);
+        (0..self.groups.len()).for_each(|part| self.take_part(system, (t, h), x, part));
+        self.history.steps = 0;
     }
 
     /// Finds a group of columns anew. Where there are no derivatives, or no rates beside the state, they stay as they are.
@@ -186,9 +206,10 @@ impl LinearlyImplicitBdf2 {
         let found = if compares {
             point.copy_from_slice(x);
             for &column in group {
-                let known = system.scales()[column];
                 let size = x[column].abs().max((h * last.rates[column]).abs());
-                point[column] += BESIDE * size.max(if known > 0.0 { known } else { UNKNOWN });
+                // Away from zero, so that what is the mirror image of something is compared on its mirror image.
+                let beside = BESIDE * size.max(known_size(system, column));
+                point[column] += if x[column] < 0.0 { -beside } else { beside };
             }
             system.rates(t, point, rates)
         } else {
@@ -209,27 +230,42 @@ impl LinearlyImplicitBdf2 {
         }
     }
 
-    /// Whether the Jacobian along the rates is so much another one that the move of a step would be.
+    /// Whether the Jacobian along the rates is so much another one that a step along them would be.
     fn is_another(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> bool {
-        let LinearlyImplicitBdf2 { history, point, rates, .. } = self;
-        let last = &history.last;
-        let found = if system.compares_rates() {
-            let way = ALONG * h;
-            (0..x.len()).for_each(|i| point[i] = x[i] + way * last.rates[i]);
+        let LinearlyImplicitBdf2 { history, point, rates, way, matrix, .. } = self;
+        let History { last, jacobian, scale, .. } = &*history;
+        if !self.factored && (scale.is_nan() || matrix.factor_values(system, t, jacobian, *scale).is_err()) {
+            return true;
+        }
+        self.factored = true;
+        (0..x.len()).for_each(|i| way[i] = h * last.rates[i]);
+        let compares = system.compares_rates();
+        let found = if compares {
+            (0..x.len()).for_each(|i| point[i] = x[i] + ALONG * way[i]);
             let found = system.rates(t, point, rates);
-            (0..x.len()).for_each(|i| rates[i] = (rates[i] - last.rates[i]) / way);
+            (0..x.len()).for_each(|i| rates[i] = (rates[i] - last.rates[i]) / ALONG);
             found
         } else {
-            system.directional_derivative(t, x, &last.rates, rates)
+            system.directional_derivative(t, x, way, rates)
         };
-        for ((row, column), value) in self.sparsity.entries().zip(&history.jacobian) {
-            rates[row] -= value * last.rates[column];
+        for ((row, column), value) in self.sparsity.entries().zip(jacobian) {
+            rates[row] -= value * way[column];
         }
-        let counts = |i: usize| (h * last.rates[i]).abs().max(SEEN * x[i].abs());
-        found.is_err() || (0..x.len()).any(|i| (h * (h * rates[i])).abs() > CHANGED * counts(i))
+        rates.iter_mut().for_each(|rate| *rate *= scale);
+        matrix.solve(rates);
+        // Exact derivatives need no size: what is 0 is 0 in them.
+        let size = |i: usize| x[i].abs().max(if compares { known_size(system, i) } else { 0.0 });
+        let counts = |i: usize| way[i].abs().max(SEEN * size(i));
+        found.is_err() || !(0..x.len()).all(|i| rates[i].abs() <= CHANGED * counts(i))
     }
 
-    /// Solves for the end of the step.
+    /// Whether the end of a step is far from where the one before leads. `end` has what is added to that.
+    fn is_doubtful(&self, x: &[f64], end: &[f64]) -> bool {
+        let far = |i: usize| end[i].abs() > OTHER * self.move_on[i].abs() && end[i].abs() > MUCH * x[i].abs();
+        !(0..x.len()).all(|i| end[i].is_finite() && !far(i))
+    }
+
+    /// Solves for the end of the step; where that is doubtful, once more with a new Jacobian.
     fn solve(
         &mut self,
         system: &mut dyn System,
@@ -237,11 +273,70 @@ impl LinearlyImplicitBdf2 {
         x: &[f64],
         end: &mut [f64],
     ) -> Result<(), Failure> {
-        let History { before, last, jacobian, scale, .. } = &mut self.history;
+        let before = &self.history.before;
         let ratio = h / before.length;
-        let ratio = if before.ends_at(t) && ratio <= LONGEST { ratio } else { 0.0 };
+        if before.ends_at(t) && ratio <= LONGEST {
+            self.solve_on(system, (t, h), ratio, x, end)?;
+            if !(self.is_doubtful(x, end) && self.is_another(system, (t, h), x)) {
+                (0..x.len()).for_each(|i| end[i] = x[i] + (self.move_on[i] + end[i]));
+                return Ok(());
+            }
+            self.take_all(system, (t, h), x);
+            return self.begin(system, (t, h), 1, x, end);
+        }
+        self.begin(system, (t, h), 2, x, end)
+    }
+
+    /// Solves for the end of a step without one before it: of order 1, or of order 2.
+    fn begin(
+        &mut self,
+        system: &mut dyn System,
+        (t, h): (f64, f64),
+        order: u32,
+        x: &[f64],
+        end: &mut [f64],
+    ) -> Result<(), Failure> {
+        self.factor(system, t, h)?;
+        let LinearlyImplicitBdf2 { history, matrix, point, rates, way, .. } = self;
+        system.rates(t + h, x, rates)?;
+        (0..x.len()).for_each(|i| way[i] = h * rates[i]);
+        matrix.solve(way);
+        (0..x.len()).for_each(|i| end[i] = x[i] + way[i]);
+        let beyond = if order == 2 { system.rates(t + h, end, point) } else { return Ok(()) };
+        if beyond.is_ok() {
+            for i in 0..x.len() {
+                point[i] = h * (point[i] - (rates[i] - history.last.rates[i])) - 2.0 * way[i];
+            }
+            matrix.solve(point);
+            (0..x.len()).for_each(|i| end[i] = x[i] + (1.5 * way[i] + 0.5 * point[i]));
+        }
+        Ok(())
+    }
+
+    /// What is added to the move that goes on as the step before did.
+    fn solve_on(
+        &mut self,
+        system: &mut dyn System,
+        (t, h): (f64, f64),
+        ratio: f64,
+        x: &[f64],
+        end: &mut [f64],
+    ) -> Result<(), Failure> {
         let own = (1.0 + 2.0 * ratio) / (1.0 + ratio);
-        let wanted = h / own;
+        self.factor(system, t, h / own)?;
+        let History { before, last, .. } = &self.history;
+        for i in 0..x.len() {
+            self.move_on[i] = ratio * (x[i] - before.from[i]);
+            let rates = (1.0 + ratio) * last.rates[i] - ratio * before.rates[i];
+            end[i] = (h * rates - self.move_on[i]) / own;
+        }
+        self.matrix.solve(end);
+        Ok(())
+    }
+
+    /// Factors the matrix for a multiple of the Jacobian, unless it has been.
+    fn factor(&mut self, system: &dyn System, t: f64, wanted: f64) -> Result<(), Failure> {
+        let History { jacobian, scale, .. } = &mut self.history;
         let serves = (*scale - wanted).abs() <= ROUNDING * wanted;
         if !serves {
             (*scale, self.factored) = (wanted, false);
@@ -250,21 +345,12 @@ impl LinearlyImplicitBdf2 {
             self.matrix.factor_values(system, t, jacobian, *scale)?;
             self.factored = true;
         }
-        if ratio == 0.0 {
-            system.rates(t + h, x, &mut self.rates)?;
-            self.move_on.fill(0.0);
-            (0..x.len()).for_each(|i| end[i] = h * self.rates[i]);
-        } else {
-            for i in 0..x.len() {
-                self.move_on[i] = ratio * (x[i] - before.from[i]);
-                let rates = (1.0 + ratio) * last.rates[i] - ratio * before.rates[i];
-                end[i] = (h * rates - self.move_on[i]) / own;
-            }
-        }
-        self.matrix.solve(end);
-        for i in 0..x.len() {
-            end[i] = x[i] + (self.move_on[i] + end[i]);
-        }
         Ok(())
     }
+}
+
+/// The size of a state as far as it is known.
+fn known_size(system: &dyn System, state: usize) -> f64 {
+    let known = system.scales()[state];
+    if known > 0.0 { known } else { UNKNOWN }
 }

@@ -34,9 +34,8 @@ pub enum FixedMethod {
     ImplicitMidpoint,
     /// Linearly implicit Euler: order 1, L-stable. 1 evaluation, 1 Jacobian, 1 factorisation a step, no iteration.
     LinearlyImplicitEuler,
-    /// Linearly implicit BDF of two steps: order 2, L-stable where the Jacobian changes slowly, which is kept and found anew a
-    /// few columns at a time. 1 evaluation and 1 solution a step; every 8 steps 1 directional derivative, or another evaluation,
-    /// and 1 factorisation.
+    /// Linearly implicit BDF of two steps: order 2, L-stable where the Jacobian changes slowly, which is kept until it is another
+    /// one along the way. 1 evaluation and 1 solution a step; every 8 steps 1 directional derivative, or another evaluation.
     LinearlyImplicitBdf2,
     /// The Rosenbrock method RODAS3: order 3, L-stable, for stiff systems in real time. 3 evaluations, 1 Jacobian,
     /// 1 factorisation and 4 solutions a step, no iteration.
@@ -53,9 +52,14 @@ impl FixedMethod {
         }
     }
 
-    /// Whether it asks for derivatives.
+    /// Whether it solves for the end of a step.
     pub fn is_implicit(self) -> bool {
         !matches!(self, FixedMethod::Euler | FixedMethod::Heun | FixedMethod::Rk4)
+    }
+
+    /// Whether it asks for the whole Jacobian at each step.
+    pub fn takes_jacobian(self) -> bool {
+        self.is_implicit() && self != FixedMethod::LinearlyImplicitBdf2
     }
 }
 
@@ -143,6 +147,17 @@ impl FixedStep {
         self.advance(system, t, h, x)?;
         x.copy_from_slice(self.advanced());
         Ok(())
+    }
+
+    /// Does beforehand what only the first of steps of this length takes.
+    ///
+    /// # Errors
+    /// What the system reports.
+    pub fn prepare(&mut self, system: &mut dyn System, t: f64, h: f64, x: &[f64]) -> Result<(), Failure> {
+        match &mut self.implicit {
+            Some(Implicit::Bdf2(method)) => method.prepare(system, (t, h), x),
+            _ => Ok(()),
+        }
     }
 
     /// A step in vain, so that what it takes is at hand; of a method that remembers steps about what it would take. Nothing is

@@ -327,15 +327,15 @@ fn tolerances(real: Real) -> [(&'static str, String); 10] {
         "ROUNDING_OF_RANK",
         "BORROWED_ROUNDING",
         "BESIDE",
-        "HALF_OF_DIGITS",
-        "ALONG_RATES",
+        "PART_BESIDE",
+        "PART_ALONG",
         "LEAST_DAMPING",
         "LEFT_OVER",
         "CLOSE_TO_SINGULAR",
     ];
     // Below it what damping asks of a correction would be rounding.
     let values = match real {
-        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1.0 / (1 << 26) as f64, 1e-6, 1e-12, 1e-10, 1e-7],
+        Real::Double => [1e-9, 1e-14, 1e-11, 1e6, 1e-8, 1.0 / (1 << 12) as f64, 1e-2, 1e-12, 1e-10, 1e-7],
         Real::Float => [3e-5, 5e-6, 2e-5, 30.0, 3e-4, 3e-4, 0.3, 1e-6, 1e-4, 3e-4],
     };
     [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| (words[i], real.number(values[i])))

@@ -61,12 +61,12 @@ impl Plan<'_> {
             // At the beginning, and where an event changes all of the Jacobian.
             Method::LinearlyImplicitBdf2 => {
                 let nonzeros = self.columns().iter().map(|rows| rows.len() as u64).sum::<u64>();
-                let parts = self.column_groups().len() as u64 + 1;
+                let parts = self.column_groups().len() as u64 + 2;
                 let mut all = match self.compares_rates() {
                     true => w.rates.clone() * (parts + 2),
                     false => w.rates.clone() * 2 + w.directional.clone() * parts,
                 };
-                all.operations += self.step_elimination(1) + 5 * nonzeros + 30 * n;
+                all.operations += 2 * self.step_elimination(3) + 8 * nonzeros + 60 * n;
                 all
             }
             _ => {

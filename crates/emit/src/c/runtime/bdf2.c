@@ -18,7 +18,6 @@ static void ha_forget_steps(ha_model *m)
     $ha_leave_steps(m);
     m->jacobian_doubted = 0;
     m->jacobian_known = 0;
-    m->jacobian_part = 0;
     m->jacobian_steps = 0;
 }
 
@@ -29,14 +28,31 @@ static int ha_ends_at(double end, $real length, double t)
     return fabs(t - end) <= $widen($CLOSE_TO_ROUNDING * length);
 }
 
+//item ha_solve_kept
+static void ha_solve_kept(ha_model *m, $real *b)
+{
+//if step_order
+    $ha_step_solve(m, b);
+//else
+    $ha_dense_solve(m, b);
+//end
+}
+
 //if compares_rates
+//item ha_size_at_least
+/* The size of a state as far as it is known. */
+static $real ha_size_at_least(const ha_model *m, int i)
+{
+    const $real known = $ha_known_size(m, i);
+    return known > $0.0 ? known : $1e-4;
+}
+
 //item ha_beside
 /* How far beside a state the rates are looked at. */
 static $real ha_beside(const ha_model *m, $real h, const $real *x, int i)
 {
-    const $real known = $ha_known_size(m, i);
     const $real size = $ha_max($fabs(x[i]), $fabs(h * m->last_rates[i]));
-    return $HALF_OF_DIGITS * $ha_max(size, known > $0.0 ? known : $1e-4);
+    return $PART_BESIDE * $ha_max(size, $ha_size_at_least(m, i));
 }
 
 //end
@@ -53,7 +69,9 @@ static void ha_take_part(ha_model *m, double t, $real h, const $real *x, int gro
     $ha_copy(m->point, x, HA_NX);
     for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
         const int column = $ha_group_columns[i];
-        m->point[column] += $ha_beside(m, h, x, column);
+        const $real beside = $ha_beside(m, h, x, column);
+        /* Away from zero, so that what is the mirror image of something is compared on its mirror image. */
+        m->point[column] += x[column] < $0.0 ? -beside : beside;
     }
     status = $model_rates(m, t, m->point, m->product);
 //else
@@ -82,25 +100,30 @@ static void ha_take_part(ha_model *m, double t, $real h, const $real *x, int gro
 }
 
 //item ha_is_another
-/* Whether the Jacobian along the rates is so much another one that the move of a step would be. */
+/* Whether the Jacobian along the rates is so much another one that a step along them would be. */
 static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
 {
     int status;
     int column;
     int i;
     int j;
-//if compares_rates
-    const $real way = $ALONG_RATES * h;
+    if (m->jacobian_scale == $0.0) {
+        return 1;
+    }
     for (i = 0; i < HA_NX; ++i) {
-        const $real move = way * m->last_rates[i];
+        m->way[i] = h * m->last_rates[i];
+    }
+//if compares_rates
+    for (i = 0; i < HA_NX; ++i) {
+        const $real move = $PART_ALONG * m->way[i];
         m->point[i] = x[i] + move;
     }
     status = $model_rates(m, t, m->point, m->product);
     for (i = 0; i < HA_NX; ++i) {
-        m->product[i] = (m->product[i] - m->last_rates[i]) / way;
+        m->product[i] = (m->product[i] - m->last_rates[i]) / $PART_ALONG;
     }
 //else
-    status = $model_tangent(m, t, x, m->last_rates, m->product);
+    status = $model_tangent(m, t, x, m->way, m->product);
 //end
     if (status != $MODEL_OK) {
         m->failure.code = $MODEL_OK;
@@ -108,53 +131,66 @@ static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
     }
     for (column = 0; column < HA_NX; ++column) {
         for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
-            const $real term = m->jacobian[j] * m->last_rates[column];
+            const $real term = m->jacobian[j] * m->way[column];
             m->product[$ha_column_rows[j]] -= term;
         }
     }
     for (i = 0; i < HA_NX; ++i) {
-        const $real counts = $ha_max($fabs(h * m->last_rates[i]), $0.01 * $fabs(x[i]));
-        if ($fabs(h * (h * m->product[i])) > $0.5 * counts) {
+        m->product[i] *= m->jacobian_scale;
+    }
+    $ha_solve_kept(m, m->product);
+    for (i = 0; i < HA_NX; ++i) {
+//if compares_rates
+        const $real size = $ha_max($fabs(x[i]), $ha_size_at_least(m, i));
+//else
+        const $real size = $fabs(x[i]);
+//end
+        if (!($fabs(m->product[i]) <= $0.5 * $ha_max($fabs(m->way[i]), $0.01 * size))) {
             return 1;
         }
     }
     return 0;
 }
 
+//item ha_take_all
+/* Finds all of the Jacobian anew. */
+static void ha_take_all(ha_model *m, double t, $real h, const $real *x)
+{
+    int group;
+    if (!m->jacobian_known) {
+        $ha_fill(m->jacobian, $0.0, $NONZEROS);
+    }
+    for (group = 0; group < $GROUPS; ++group) {
+        $ha_take_part(m, t, h, x, group);
+    }
+    m->jacobian_known = 1;
+    m->jacobian_steps = 0;
+}
+
 //item ha_renew
-/* Finds anew what is due of the Jacobian. */
+/* Finds the Jacobian anew where it is due. */
 static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on)
 {
-    const int all = !m->jacobian_known || (m->jacobian_doubted && $ha_is_another(m, t, h, x));
-    int group;
+    const int steps = m->jacobian_steps + goes_on;
+    const int looks = m->jacobian_doubted || steps >= 8;
     m->jacobian_doubted = 0;
-    if (all) {
-        if (!m->jacobian_known) {
-            $ha_fill(m->jacobian, $0.0, $NONZEROS);
-        }
-        for (group = 0; group < $GROUPS; ++group) {
-            $ha_take_part(m, t, h, x, group);
-        }
-        m->jacobian_known = 1;
-        m->jacobian_part = 0;
-        m->jacobian_steps = 0;
-    } else if (goes_on) {
-        ++m->jacobian_steps;
-        if (m->jacobian_steps == 8) {
-            $ha_take_part(m, t, h, x, m->jacobian_part);
-            m->jacobian_part = m->jacobian_part + 1 < $GROUPS ? m->jacobian_part + 1 : 0;
-            m->jacobian_steps = 0;
-        }
+    m->jacobian_steps = looks ? 0 : steps;
+    if (!m->jacobian_known || (looks && $ha_is_another(m, t, h, x))) {
+        $ha_take_all(m, t, h, x);
     }
 }
 
 //item ha_factor_kept
-/* Factors 1 - m->jacobian_scale * Jacobian. */
-static int ha_factor_kept(ha_model *m, double t)
+/* Factors 1 - scale * Jacobian, unless it has been. */
+static int ha_factor_kept(ha_model *m, double t, $real scale)
 {
     int column;
     int i;
     int j;
+    if ($fabs(m->jacobian_scale - scale) <= $CLOSE_TO_ROUNDING * scale) {
+        return $MODEL_OK;
+    }
+    m->jacobian_scale = scale;
 //if step_order
     $ha_fill(m->step_entries, $0.0, $ha_step_starts[HA_NX]);
     for (i = 0; i < HA_NX; ++i) {
@@ -187,46 +223,104 @@ static int ha_factor_kept(ha_model *m, double t)
     return $MODEL_OK;
 }
 
-//item ha_solve_step
-/* The move from x beyond that of the step before, in m->correction, and this one, in m->move_on. */
-static int ha_solve_step(ha_model *m, double t, $real h, const $real *x)
+//item ha_solve_on
+/* What is added to the move that goes on as the step before did, m->move_on: in m->correction. */
+static int ha_solve_on(ha_model *m, double t, $real h, $real ratio, const $real *x)
 {
-    const int continues = m->before_counts && $ha_ends_at(m->before_end, m->before_length, t);
-    const $real longer = h / m->before_length;
-    const $real ratio = continues && longer <= $2.0 ? longer : $0.0;
     const $real twice = $2.0 * ratio;
     const $real own = ($1.0 + twice) / ($1.0 + ratio);
-    const $real scale = h / own;
-    int status = $MODEL_OK;
+    const int status = $ha_factor_kept(m, t, h / own);
     int i;
-    if (!($fabs(m->jacobian_scale - scale) <= $CLOSE_TO_ROUNDING * scale)) {
-        m->jacobian_scale = scale;
-        status = $ha_factor_kept(m, t);
+    if (status != $MODEL_OK) {
+        return status;
     }
-    if (status == $MODEL_OK && ratio == $0.0) {
-        status = $model_rates(m, t + $widen(h), x, m->product);
+    for (i = 0; i < HA_NX; ++i) {
+        const $real now = ($1.0 + ratio) * m->last_rates[i];
+        const $real then = ratio * m->before_rates[i];
+        const $real way = h * (now - then);
+        m->move_on[i] = ratio * (x[i] - m->before_from[i]);
+        m->correction[i] = (way - m->move_on[i]) / own;
+    }
+    $ha_solve_kept(m, m->correction);
+    return $MODEL_OK;
+}
+
+//item ha_is_doubtful
+/* Whether the end of a step is far from where the one before leads. */
+static int ha_is_doubtful(const ha_model *m, const $real *x)
+{
+    int i;
+    for (i = 0; i < HA_NX; ++i) {
+        const $real added = $fabs(m->correction[i]);
+        if (!$ha_finite(added) || (added > $2.0 * $fabs(m->move_on[i]) && added > $0.1 * $fabs(x[i]))) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+//item ha_begin
+/* The end of a step without one before it, in m->trial: of order 1, or of order 2. */
+static int ha_begin(ha_model *m, double t, $real h, int order, const $real *x)
+{
+    const double end = t + $widen(h);
+    int status = $ha_factor_kept(m, t, h);
+    int i;
+    if (status == $MODEL_OK) {
+        status = $model_rates(m, end, x, m->product);
     }
     if (status != $MODEL_OK) {
         return status;
     }
     for (i = 0; i < HA_NX; ++i) {
-        if (ratio == $0.0) {
-            m->move_on[i] = $0.0;
-            m->correction[i] = h * m->product[i];
-        } else {
-            const $real now = ($1.0 + ratio) * m->last_rates[i];
-            const $real then = ratio * m->before_rates[i];
-            const $real way = h * (now - then);
-            m->move_on[i] = ratio * (x[i] - m->before_from[i]);
-            m->correction[i] = (way - m->move_on[i]) / own;
-        }
+        m->way[i] = h * m->product[i];
     }
-//if step_order
-    $ha_step_solve(m, m->correction);
-//else
-    $ha_dense_solve(m, m->correction);
-//end
+    $ha_solve_kept(m, m->way);
+    for (i = 0; i < HA_NX; ++i) {
+        m->trial[i] = x[i] + m->way[i];
+    }
+    if (order == 1) {
+        return $MODEL_OK;
+    }
+    if ($model_rates(m, end, m->trial, m->point) != $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
+        return $MODEL_OK;
+    }
+    for (i = 0; i < HA_NX; ++i) {
+        const $real beyond = h * (m->point[i] - (m->product[i] - m->last_rates[i]));
+        const $real twice = $2.0 * m->way[i];
+        m->point[i] = beyond - twice;
+    }
+    $ha_solve_kept(m, m->point);
+    for (i = 0; i < HA_NX; ++i) {
+        const $real first = $1.5 * m->way[i];
+        const $real second = $0.5 * m->point[i];
+        m->trial[i] = x[i] + (first + second);
+    }
     return $MODEL_OK;
+}
+
+//item ha_solve_step
+/* The end of the step, in m->trial; where it is doubtful, once more with a new Jacobian. */
+static int ha_solve_step(ha_model *m, double t, $real h, const $real *x)
+{
+    const $real ratio = h / m->before_length;
+    int i;
+    if (m->before_counts && $ha_ends_at(m->before_end, m->before_length, t) && ratio <= $20.0) {
+        const int status = $ha_solve_on(m, t, h, ratio, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+        if (!($ha_is_doubtful(m, x) && $ha_is_another(m, t, h, x))) {
+            for (i = 0; i < HA_NX; ++i) {
+                m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
+            }
+            return $MODEL_OK;
+        }
+        $ha_take_all(m, t, h, x);
+        return $ha_begin(m, t, h, 1, x);
+    }
+    return $ha_begin(m, t, h, 2, x);
 }
 
 //item ha_method
@@ -235,7 +329,6 @@ static int ha_method(ha_model *m, double t, $real h, const $real *x)
 {
     const int goes_on = m->last_counts && $ha_ends_at(m->last_end, m->last_length, t);
     int status;
-    int i;
     if (goes_on) {
         $ha_copy(m->before_from, m->last_from, HA_NX);
         $ha_copy(m->before_rates, m->last_rates, HA_NX);
@@ -253,9 +346,6 @@ static int ha_method(ha_model *m, double t, $real h, const $real *x)
     }
     if (status != $MODEL_OK) {
         return status;
-    }
-    for (i = 0; i < HA_NX; ++i) {
-        m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
     }
     $ha_copy(m->last_from, x, HA_NX);
     m->last_end = t + $widen(h);
