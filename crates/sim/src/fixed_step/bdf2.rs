@@ -31,15 +31,17 @@ const MUCH: f64 = 0.1;
 /// Part of a step that is rounding: what is not further apart is the same time, or the same length.
 const ROUNDING: f64 = 1e-9;
 
-/// Part of the move of a step that another Jacobian may change, and part of a state below which a move does not count.
-const CHANGED: f64 = 0.5;
-const SEEN: f64 = 0.01;
+/// Part of the move of a step that another Jacobian may change: steps swing up from a third on. And part of a state below which a
+/// move does not count.
+const CHANGED: f64 = 0.2;
+const SEEN: f64 = 1e-4;
 
 /// Parts of a state, and of a move, over which rates are compared: a matrix that serves steps needs few digits, and what is 0 in it
 /// but for rounding is to stay small, or a car that goes straight on leaves its plane. And the size of a state that is not known,
-/// at least.
+/// and the least that counts.
 const BESIDE: f64 = 1.0 / (1 << 12) as f64;
 const UNKNOWN: f64 = 1e-4;
+const LEAST: f64 = 1e-6;
 const ALONG: f64 = 1e-2;
 
 /// What is remembered of earlier steps.
@@ -349,8 +351,8 @@ impl LinearlyImplicitBdf2 {
     }
 }
 
-/// The size of a state as far as it is known.
+/// The size of a state as far as it is known. That of a speed that is 0 may be rounding.
 fn known_size(system: &dyn System, state: usize) -> f64 {
     let known = system.scales()[state];
-    if known > 0.0 { known } else { UNKNOWN }
+    if known > 0.0 { known.max(LEAST) } else { UNKNOWN }
 }

@@ -40,11 +40,11 @@ static void ha_solve_kept(ha_model *m, $real *b)
 
 //if compares_rates
 //item ha_size_at_least
-/* The size of a state as far as it is known. */
+/* The size of a state as far as it is known. That of a speed that is 0 may be rounding. */
 static $real ha_size_at_least(const ha_model *m, int i)
 {
     const $real known = $ha_known_size(m, i);
-    return known > $0.0 ? known : $1e-4;
+    return known > $0.0 ? $ha_max(known, $1e-6) : $1e-4;
 }
 
 //item ha_beside
@@ -145,7 +145,7 @@ static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
 //else
         const $real size = $fabs(x[i]);
 //end
-        if (!($fabs(m->product[i]) <= $0.5 * $ha_max($fabs(m->way[i]), $0.01 * size))) {
+        if (!($fabs(m->product[i]) <= $0.2 * $ha_max($fabs(m->way[i]), $1e-4 * size))) {
             return 1;
         }
     }
