@@ -28,16 +28,6 @@ static int ha_ends_at(double end, $real length, double t)
     return fabs(t - end) <= $widen($CLOSE_TO_ROUNDING * length);
 }
 
-//item ha_solve_kept
-static void ha_solve_kept(ha_model *m, $real *b)
-{
-//if step_order
-    $ha_step_solve(m, b);
-//else
-    $ha_dense_solve(m, b);
-//end
-}
-
 //if compares_rates
 //item ha_size_at_least
 /* The size of a state as far as it is known. That of a speed that is 0 may be rounding. */
@@ -138,7 +128,7 @@ static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
     for (i = 0; i < HA_NX; ++i) {
         m->product[i] *= m->jacobian_scale;
     }
-    $ha_solve_kept(m, m->product);
+    $ha_matrix_solve(m, m->product);
     for (i = 0; i < HA_NX; ++i) {
 //if compares_rates
         const $real size = $ha_max($fabs(x[i]), $ha_size_at_least(m, i));
@@ -191,17 +181,7 @@ static int ha_factor_kept(ha_model *m, double t, $real scale)
         return $MODEL_OK;
     }
     m->jacobian_scale = scale;
-//if step_order
-    $ha_fill(m->step_entries, $0.0, $ha_step_starts[HA_NX]);
-    for (i = 0; i < HA_NX; ++i) {
-        m->step_entries[$ha_step_diagonal[i]] = $1.0;
-    }
-//else
-    $ha_fill(m->matrix, $0.0, HA_NX * HA_NX);
-    for (i = 0; i < HA_NX; ++i) {
-        m->matrix[i * HA_NX + i] = $1.0;
-    }
-//end
+    $ha_set_unit(m);
     for (column = 0; column < HA_NX; ++column) {
         for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
 //if step_order
@@ -241,7 +221,7 @@ static int ha_solve_on(ha_model *m, double t, $real h, $real ratio, const $real 
         m->move_on[i] = ratio * (x[i] - m->before_from[i]);
         m->correction[i] = (way - m->move_on[i]) / own;
     }
-    $ha_solve_kept(m, m->correction);
+    $ha_matrix_solve(m, m->correction);
     return $MODEL_OK;
 }
 
@@ -275,7 +255,7 @@ static int ha_begin(ha_model *m, double t, $real h, int order, const $real *x)
     for (i = 0; i < HA_NX; ++i) {
         m->way[i] = h * m->product[i];
     }
-    $ha_solve_kept(m, m->way);
+    $ha_matrix_solve(m, m->way);
     for (i = 0; i < HA_NX; ++i) {
         m->trial[i] = x[i] + m->way[i];
     }
@@ -291,7 +271,7 @@ static int ha_begin(ha_model *m, double t, $real h, int order, const $real *x)
         const $real twice = $2.0 * m->way[i];
         m->point[i] = beyond - twice;
     }
-    $ha_solve_kept(m, m->point);
+    $ha_matrix_solve(m, m->point);
     for (i = 0; i < HA_NX; ++i) {
         const $real first = $1.5 * m->way[i];
         const $real second = $0.5 * m->point[i];

@@ -102,22 +102,18 @@ static int ha_cross_begin(ha_model *m, double t, $real *x)
 static int ha_hold_sides(ha_model *m, double t, const $real *x)
 {
 //if switches
-//if moves
-    const int status = $model_indicators(m, t, x, m->beyond);
+    int status = $MODEL_OK;
     int i;
+//if moves
+    status = $model_indicators(m, t, x, m->beyond);
+//else
+    /* Operands are those of which sides have just been taken. */
+    $ha_indicators_of_operands(m, t, m->beyond);
+    (void)x;
+//end
     for (i = 0; i < HA_NG && status == $MODEL_OK; ++i) {
         m->sides[i] = m->beyond[i] > $0.0;
     }
-//else
-    /* Operands are those of which sides have just been taken. */
-    const int status = $MODEL_OK;
-    int i;
-    $ha_indicators_of_operands(m, t, m->beyond);
-    for (i = 0; i < HA_NG; ++i) {
-        m->sides[i] = m->beyond[i] > $0.0;
-    }
-    (void)x;
-//end
 //if bounds
     $ha_copy(m->seen + HA_START * HA_NG, m->beyond, HA_NG);
     m->last_step = 0.0;

@@ -324,13 +324,21 @@ static void ha_step_solve(ha_model *m, $real *b)
 }
 
 //end
-//item ha_step_matrix
-/* Factors 1 - factor * Jacobian at x; m->sizes takes up what its rows add up where the states are. */
-static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
+//item ha_matrix_solve
+static void ha_matrix_solve(ha_model *m, $real *b)
 {
-    int group;
+//if step_order
+    $ha_step_solve(m, b);
+//else
+    $ha_dense_solve(m, b);
+//end
+}
+
+//item ha_set_unit
+/* The matrix is that of ones. */
+static void ha_set_unit(ha_model *m)
+{
     int i;
-    int j;
 //if step_order
     $ha_fill(m->step_entries, $0.0, $ha_step_starts[HA_NX]);
     for (i = 0; i < HA_NX; ++i) {
@@ -342,6 +350,16 @@ static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
         m->matrix[i * HA_NX + i] = $1.0;
     }
 //end
+}
+
+//item ha_step_matrix
+/* Factors 1 - factor * Jacobian at x; m->sizes takes up what its rows add up where the states are. */
+static int ha_step_matrix(ha_model *m, double t, const $real *x, $real factor)
+{
+    int group;
+    int i;
+    int j;
+    $ha_set_unit(m);
     for (group = 0; group < $GROUPS; ++group) {
         int status;
         $ha_fill(m->direction, $0.0, HA_NX);

@@ -27,11 +27,7 @@ static int ha_correct(ha_model *m, double t, $real half, const $real *x)
         m->correction[i] = end - m->middle[i];
 //end
     }
-//if step_order
-    $ha_step_solve(m, m->correction);
-//else
-    $ha_dense_solve(m, m->correction);
-//end
+    $ha_matrix_solve(m, m->correction);
     for (i = 0; i < HA_NX; ++i) {
 //if single
         m->half_way[i] += m->correction[i];

@@ -48,11 +48,7 @@ static int ha_method(ha_model *m, double t, $real h, const $real *x)
             sum *= $GAMMA;
             own[i] = rate + sum;
         }
-//if step_order
-        $ha_step_solve(m, own);
-//else
-        $ha_dense_solve(m, own);
-//end
+        $ha_matrix_solve(m, own);
     }
     $ha_arrive(m, x, $1.0, states[$STAGES]);
     return $MODEL_OK;
