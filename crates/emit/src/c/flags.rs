@@ -61,6 +61,8 @@ flags! {
     clauses
     conditional_clauses
     periodic_clauses
+    /// Conditions on one number, which may be on its way back after an event.
+    returns
     /// Crossings of conditions are located within steps.
     locates
     /// Balances of impulses.

@@ -205,6 +205,19 @@ fn of_clauses(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Clause, &["clauses"], p.clauses.len(), "what happens at events");
         list.some(Kind::Real, &["becomes"], events.conditional.len(), "their conditions");
         list.arrays(Kind::Real, &["new_values"], events.actions(), "what they change");
+        let returns = events.returning.len();
+        if returns > 0 {
+            list.one(Kind::Int, &["returns_due"], "whether what has happened is on its way back");
+            list.one(Kind::Wide, &["returns_since"], "when it happened");
+            list.arrays(Kind::Int, &["returning"], returns, "of which conditions");
+            list.arrays(
+                Kind::Real,
+                &["returning_from", "returning_way"],
+                returns,
+                "operands then, and the way they go",
+            );
+            list.arrays(Kind::Real, &["returning_out", "returning_rates"], returns, "");
+        }
     }
     if plan.locates() {
         list.one(Kind::Int, &["handled"], "whether an event has been handled at the present time");

@@ -123,6 +123,12 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
             }),
         ),
         (
+            "LOST",
+            clauses(&|name| {
+                format!("`{name}` holds further on after it has happened, and the way back that it began with was shorter than a step can tell: shorten the step, end the run before it, or let a law take over where events get fast, such as a contact (`constraint gap: x >= 0`)")
+            }),
+        ),
+        (
             "RESET_DEPENDENT",
             resets(&|what| {
                 format!("{what} cannot be reset: what is reset depends on each other there, or nothing that keeps an impulse takes part: reset one of those that move together")
@@ -216,6 +222,7 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "CONFLICT" => "two events at one instant give one thing different values",
         "ENDLESS_EVENTS" => "events at one instant set each other off without end",
         "ACCUMULATION" => "events come ever faster",
+        "LOST" => "a condition holds further on after its event has led back across its border",
         "RESET_DEPENDENT" => "resets of what moves together",
         "RESET_UNMET" => "no impulse leads to what a reset asks for",
         "NO_MODE" => "no branch of the set-valued laws fits",
@@ -232,6 +239,7 @@ fn can_happen(code: &str, plan: &Plan) -> bool {
     match code {
         "OUT_OF_RANGE" => plan.export.real == Real::Float,
         "EVENT_NOT_FINITE" | "CONFLICT" | "ENDLESS_EVENTS" | "ACCUMULATION" => !plan.program.clauses.is_empty(),
+        "LOST" => !plan.events.returning.is_empty(),
         "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
         "NO_MODE" | "STUCK" | "OVERLAP" => !plan.program.set_valued.is_empty(),
         "NOT_PUT_BACK" => !plan.relations().is_empty(),

@@ -1,6 +1,6 @@
 //! What happens at events, in tables.
 
-use halfarrow_compiler::program::{Program, StartCondition, Target, Trigger, Value};
+use halfarrow_compiler::program::{EventTrigger, Op, Program, StartCondition, Target, Trigger, Value};
 
 use crate::c::header::comment;
 use crate::c::written::{Needed, Notes, Part, Written, written};
@@ -14,6 +14,9 @@ pub(in crate::c) struct EventTables {
     /// Clauses with a condition, and those with a period.
     pub conditional: Vec<usize>,
     pub periodic: Vec<usize>,
+    /// Clauses of the modeller whose condition is the sign of one number of the state, and these numbers: what they lead to may
+    /// be on its way back across the border.
+    pub returning: Vec<(usize, Value)>,
     /// Where the actions of each clause begin.
     starts: Vec<usize>,
     /// What each changes: of which kind, its place, the impulse that does it.
@@ -44,7 +47,17 @@ impl EventTables {
                 (2, moved.binary_search(&what).expect("it is among what resets change"), impulse as usize)
             }
         };
+        let sign = |trigger| match (trigger, program.values.op(Trigger::value(trigger))) {
+            (Trigger::Becomes(_), Op::Sign(condition, _)) => Some(&program.conditions[condition]),
+            _ => None,
+        };
+        let own = all().filter(|(_, c)| c.bound.is_none());
+        let returning = own.filter_map(|(i, c)| Some((i, sign(c.trigger)?)));
         let mut tables = EventTables {
+            returning: returning
+                .filter(|(_, c)| c.trigger == EventTrigger::State)
+                .map(|(i, c)| (i, c.operand))
+                .collect(),
             conditional: all().filter(|(_, c)| !is_periodic(c.trigger)).map(|(i, _)| i).collect(),
             periodic: all().filter(|(_, c)| is_periodic(c.trigger)).map(|(i, _)| i).collect(),
             starts: starts(program.clauses.iter().map(|c| c.actions.len())),
@@ -104,6 +117,8 @@ impl EventTables {
             ("CONDITIONALS", self.conditional.len().to_string()),
             ("PERIODIC", list(numbers(&self.periodic))),
             ("PERIODICS", self.periodic.len().to_string()),
+            ("RETURNING", list(self.returning.iter().map(|r| r.0.to_string()).collect())),
+            ("RETURNS", self.returning.len().to_string()),
             ("ACTIONS", self.actions.len().to_string()),
             ("ACTION_STARTS", lines(numbers(&self.starts))),
             ("ACTION_KINDS", lines(self.actions.iter().map(|a| KINDS[a.0].to_string()).collect())),

@@ -108,6 +108,7 @@ struct Works {
     observe: OperationCount,
     switching: OperationCount,
     sources: OperationCount,
+    returns: OperationCount,
     directional: OperationCount,
     clock: OperationCount,
     /// A round of what happens at events.
@@ -230,6 +231,7 @@ impl<'a> Plan<'a> {
         let run =
             Moving { time: Some(TimeRate::OfDirection), inputs: true, held: true, states: true, ..Moving::default() };
         functions.extend(along(&mut writer, "ha_sources_along", ALONG, &routines.sources, run));
+        functions.extend(along(&mut writer, "ha_returns_along", ALONG, &routines.returns, run));
         if self.mode.as_ref().is_some_and(ModeTables::has_laws) {
             functions.extend(along(&mut writer, "ha_margins_along", ALONG, &routines.margins, run));
         }
@@ -275,6 +277,7 @@ impl<'a> Plan<'a> {
             solutions: work(&routines.solutions),
             switching: work(&routines.switching),
             sources: work(&routines.sources),
+            returns: work(&routines.returns).along(),
             directional: work(&routines.rates).along(),
             clock: work(&routines.clock).along(),
             round: self.round(&routines),

@@ -20,6 +20,8 @@ pub(super) struct Routines {
     pub clock: Routine,
     pub sources: Routine,
     pub domains: Routine,
+    /// What may be on its way back after an event.
+    pub returns: Routine,
     /// Conditions of events, the new values that each event gives, what storages keep, the same with what balances of
     /// impulses read, constraints on displacements.
     pub becomes: Routine,
@@ -81,6 +83,7 @@ impl Routines {
             compared: of_bounds(&|b| b.bounds.compared.concat()),
             carried: p.routine(&wanted),
             becomes: p.routine(&becomes),
+            returns: p.routine(&events.returning.iter().map(|r| r.1).collect::<Vec<_>>()),
             clauses: p.clauses.iter().map(values).collect(),
             stored: p.routine(stored),
             impulses: p.routine(&balanced.collect::<Vec<_>>()),
@@ -103,7 +106,7 @@ impl Routines {
     fn all(&self) -> impl Iterator<Item = &Routine> {
         let Routines { preamble, rates, solutions, motion, shown_motion, observe, switching, clock, .. } = self;
         let Routines { becomes, clauses, stored, impulses, positions, starts, margins, compared, carried, .. } = self;
-        let Routines { open, ratios, pivots, relations, sources, domains, .. } = self;
+        let Routines { open, ratios, pivots, relations, sources, domains, returns, .. } = self;
         let all = [
             preamble,
             rates,
@@ -116,6 +119,7 @@ impl Routines {
             sources,
             domains,
             becomes,
+            returns,
             stored,
             impulses,
             positions,

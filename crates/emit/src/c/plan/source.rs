@@ -96,6 +96,8 @@ impl Plan<'_> {
         }
         put(filling.fragments(include_str!("../runtime/held.c")));
         put(filling.fragments(include_str!("../runtime/system.c")));
+        put(filling.fragments(include_str!("../runtime/returns.c")));
+        put(filling.fragments(include_str!("../runtime/accept.c")));
         put(filling.fragments(include_str!("../runtime/margins.c")));
         put(filling.fragments(include_str!("../runtime/branches.c")));
         if !self.program.clauses.is_empty() || self.program.jumps.is_some() {
@@ -159,6 +161,7 @@ impl Plan<'_> {
             clauses: !p.clauses.is_empty(),
             conditional_clauses: !self.events.conditional.is_empty(),
             periodic_clauses: !self.events.periodic.is_empty(),
+            returns: !self.events.returning.is_empty(),
             locates: self.locates(),
             impulses: p.jumps.is_some(),
             resets: !self.events.moved.is_empty(),
@@ -186,7 +189,7 @@ impl Plan<'_> {
             time_derivative,
             keeps_steps: export.method.keeps_steps(),
             compares_rates: self.compares_rates(),
-            time_passes: time_derivative || held || bounds.is_some(),
+            time_passes: time_derivative || held || bounds.is_some() || !self.events.returning.is_empty(),
             moves: !p.clauses.is_empty() || mode.is_some(),
             modes: mode.is_some(),
             exchanges: mode.is_some_and(|mode| mode.modes.exchanged() > 0),

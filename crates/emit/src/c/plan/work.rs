@@ -95,7 +95,12 @@ impl Plan<'_> {
         let looks = 2 + curves * (2 * 4000 + 4 * 2200);
         let clock = if self.clocks.is_empty() { OperationCount::default() } else { w.clock.clone() * looks };
         let sampled = (w.rates.clone() + w.sources.clone().along()) * if held > 0 { held.max(1) } else { 0 };
-        let mut jump = clock + sampled + w.switching.clone() * 2 + sources + followed;
+        let returns = match self.events.returning.is_empty() {
+            true => OperationCount::default(),
+            false => w.rates.clone() + w.returns.clone(),
+        };
+        step = step + w.returns.clone();
+        let mut jump = clock + sampled + w.switching.clone() * 2 + sources + followed + returns;
         if self.program.jumps.as_ref().is_some_and(|jumps| jumps.leaps) {
             jump = jump + w.round.clone() * 3 + w.switching.clone();
         }

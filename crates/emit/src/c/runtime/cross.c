@@ -146,6 +146,12 @@ static int ha_cross_end(ha_model *m, double t, const $real *x)
         }
     }
 //end
+//if returns
+    status = $ha_note_returns(m, t, x);
+    if (status != $MODEL_OK) {
+        return status;
+    }
+//end
 //if follows
     status = $ha_follow_solutions(m, t, x);
     if (status != $MODEL_OK) {
