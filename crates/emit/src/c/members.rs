@@ -328,8 +328,8 @@ fn of_blocks(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Int, &["fresh", "settled"], plan.newton.len(), about);
         list.some(Kind::Real, &["solutions"], plan.solutions, "");
         if !plan.sought_positions().is_empty() {
-            let about = "whether the motion of positions is known, and their last way was short";
-            list.arrays(Kind::Int, &["motion_known", "motion_short"], plan.newton.len(), about);
+            let about = "whether the motion of positions is known, their last way was short, and far from where they are singular";
+            list.arrays(Kind::Int, &["motion_known", "motion_short", "motion_regular"], plan.newton.len(), about);
             list.arrays(Kind::Wide, &["motion_time", "motion_passed"], plan.newton.len(), "since when, and before");
             list.one(Kind::Wide, &["sought_at"], "the time for which they are sought");
         }

@@ -39,3 +39,5 @@ pub(crate) use workspace::{Followed, Newton};
 
 /// A correction below this part of the unknowns that no longer gets shorter is rounding.
 pub(in crate::bytecode) const CLOSE_TO_ROUNDING: f64 = 1e-9;
+/// A way to a root is far from where the Jacobian is singular if it is at most this part of the distance.
+const REGULAR: f64 = 0.01;

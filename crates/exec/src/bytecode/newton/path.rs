@@ -1,8 +1,8 @@
 //! Whether a root is the continuation of the one at which the iteration started.
 
-use super::CLOSE_TO_ROUNDING;
 use super::correction::greatest;
 use super::workspace::Newton;
+use super::{CLOSE_TO_ROUNDING, REGULAR};
 use crate::bytecode::frame::{Frame, entries};
 use crate::bytecode::instruction::Solve;
 
@@ -39,6 +39,7 @@ impl Frame {
             solver.factors.solve_once(&mut newton.simplified);
             off = off.max(newton.distance_from_first_correction());
         }
+        newton.regular = off <= REGULAR * most;
         if !newton.following {
             return off <= 0.5 * most;
         }
@@ -49,7 +50,9 @@ impl Frame {
             newton.simplified[i] = terms.sum();
         }
         solver.factors.solve_once(&mut newton.simplified);
-        off.max(newton.distance_from_first_correction()) <= 0.5 * most
+        let off = off.max(newton.distance_from_first_correction());
+        newton.regular = off <= REGULAR * most;
+        off <= 0.5 * most
     }
 
     /// Whether the natural level function falls all the way from the start to the root, and the determinant of the Jacobian

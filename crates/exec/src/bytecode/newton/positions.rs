@@ -4,9 +4,9 @@
 //! leads into either of them there; the smooth one is where the rates point that the positions had, on either side of it:
 //! [Allgower and Georg], "Introduction to Numerical Continuation Methods", chapter 8, on jumping over bifurcation points.
 
-use super::CLOSE_TO_ROUNDING;
 use super::damped::Globalization;
 use super::workspace::Newton;
+use super::{CLOSE_TO_ROUNDING, REGULAR};
 use crate::bytecode::frame::Frame;
 use crate::bytecode::instruction::Solve;
 
@@ -75,7 +75,7 @@ impl Frame {
             let no_turn = way <= FEW * size.min(1.0) || strayed <= 0.5 * way;
             let short = way <= CLOSE_TO_ROUNDING * size || change <= SHORT * way && no_turn;
             let newton = self.newton_of(solve);
-            newton.short = short;
+            (newton.short, newton.regular) = (short, change <= REGULAR * way);
             // From where the Jacobian is singular.
             let distance = way * (way / change);
             let far = distance >= f64::max(way / NEAREST, CLOSE_TO_SINGULAR * size.sqrt());

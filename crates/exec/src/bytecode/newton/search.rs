@@ -74,7 +74,8 @@ impl Frame {
     fn find_single_root(&mut self, solve: &Solve) -> Result<(), SolveError> {
         let Frame { r, solvers, .. } = self;
         let newton = &mut solvers[solve.block.0 as usize].newton;
-        (newton.evaluations, newton.fresh, newton.valued, newton.short) = (0, false, false, true);
+        (newton.evaluations, newton.fresh, newton.valued) = (0, false, false);
+        (newton.short, newton.regular) = (true, false);
         newton.floating.now.fill(false);
         newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
@@ -147,7 +148,9 @@ impl Frame {
             Ok(()) => self.other_root(solve),
             Err(failed) => NoContinuation::NotConverged(failed),
         };
-        if self.continue_in_steps(solve) || self.continue_above_rounding(solve) { Ok(()) } else { Err(why) }
+        let found = self.continue_in_steps(solve) || self.continue_above_rounding(solve);
+        self.newton_of(solve).regular = false;
+        if found { Ok(()) } else { Err(why) }
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never

@@ -73,6 +73,8 @@ pub(crate) struct Newton {
     pub(super) expected: Vec<f64>,
     /// Whether the last way of positions was short.
     pub(super) short: bool,
+    /// Whether the way was a small part of the distance from where the Jacobian is singular.
+    pub(super) regular: bool,
     /// Whether the laws had a value where an iteration began, since a root is sought.
     pub(super) valued: bool,
     /// Unknowns that no equation determines.
@@ -101,6 +103,7 @@ impl Newton {
             previous: line.clone(),
             expected: line.clone(),
             short: true,
+            regular: false,
             version: 1,
             following: false,
             settled: false,
@@ -182,8 +185,9 @@ impl Newton {
         self.previous.copy_from_slice(&self.x);
         self.previous_outer.copy_from_slice(&self.outer);
         self.previous_jacobian.copy_from_slice(&self.jacobian);
-        // Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more.
-        let settled = self.fresh && !self.positions;
+        // Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once
+        // more where the Jacobian may be singular near by.
+        let settled = self.fresh && (self.regular || !self.positions);
         (self.following, self.settled, self.fresh, self.short) = (true, settled, settled, true);
     }
 
@@ -223,7 +227,7 @@ impl Newton {
         self.outer.copy_from_slice(&self.previous_outer);
         self.jacobian.copy_from_slice(&self.previous_jacobian);
         self.floating.now.fill(false);
-        (self.evaluations, self.fresh, self.short) = (0, true, true);
+        (self.evaluations, self.fresh, self.short, self.regular) = (0, true, true, true);
     }
 
     /// The next iteration starts at the previous solution.

@@ -48,6 +48,7 @@ static int ha_is_continuation(ha_newton *w)
         $ha_lu_solve_once(&w->lu, w->simplified);
         off = $ha_max(off, $ha_distance_from_first_correction(w));
     }
+    w->regular = off <= $0.01 * most;
     if (!w->following) {
         return off <= $0.5 * most;
     }
@@ -61,7 +62,9 @@ static int ha_is_continuation(ha_newton *w)
         w->simplified[i] = sum;
     }
     $ha_lu_solve_once(&w->lu, w->simplified);
-    return $ha_max(off, $ha_distance_from_first_correction(w)) <= $0.5 * most;
+    off = $ha_max(off, $ha_distance_from_first_correction(w));
+    w->regular = off <= $0.01 * most;
+    return off <= $0.5 * most;
 }
 
 //item ha_moves_little
@@ -370,6 +373,7 @@ static int ha_follow_motion(ha_model *m, ha_newton *w, int number)
     strayed = $ha_between(w->x, w->expected, w->n);
     change = $ha_change_on_way(w);
     /* A whole turn would end at the same Jacobian. */
+    w->regular = change <= $0.01 * way;
     m->motion_short[number] = way <= $CLOSE_TO_ROUNDING * size
         || (change <= $0.5 * way && (way <= $0.25 * (size < $1.0 ? size : $1.0) || strayed <= $0.5 * way));
     if (m->motion_short[number]) {
@@ -435,6 +439,7 @@ static int ha_continue_root(ha_model *m, ha_newton *w, int number)
         w->magnitude[i] = $ha_max($fabs(w->x[i]), $fabs(w->previous[i]));
     }
     if ($ha_continue_in_steps(m, w) || $ha_continue_above_rounding(m, w)) {
+        w->regular = 0;
         return $MODEL_OK;
     }
     return why == $MODEL_NO_CONVERGENCE && w->evaluations >= w->limit ? $MODEL_BOUND : why;

@@ -193,6 +193,7 @@ static int ha_has_root(ha_model *m, const ha_kept *k, int number, const $real *o
     m->fresh[number] = 1;
 //if sought_positions
     m->motion_short[number] = 1;
+    m->motion_regular[number] = 1;
 //end
     return 1;
 }
@@ -210,6 +211,9 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     }
     w = $ha_newton_of(m, number);
     m->fresh[number] = 0;
+//if sought_positions
+    m->motion_regular[number] = 0;
+//end
     $ha_copy(w.outer, o, w.block->reads);
     $ha_copy(w.present, o, w.block->reads);
     $ha_fill(w.floor, $0.0, w.n);
@@ -229,6 +233,9 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     $ha_copy(w.jacobian, w.matrix, w.entries);
     $ha_copy(x, w.x, w.n);
     m->fresh[number] = !w.block->conditions;
+//if sought_positions
+    m->motion_regular[number] = w.regular;
+//end
     return $MODEL_OK;
 }
 

@@ -47,6 +47,8 @@ typedef struct {
     int first_factors;
     /* Whether the root is where the iteration began, but for a first correction that is rounding. */
     int rests;
+    /* Whether the way was a small part of the distance from where the Jacobian is singular. */
+    int regular;
     /* Whether the laws had a value where an iteration began. */
     int valued;
     /* The previous solution, what the block read there, and its Jacobian. */
@@ -161,6 +163,7 @@ static ha_newton ha_newton_of(ha_model *m, int number)
     w.contracts = 0;
     w.first_factors = 0;
     w.rests = 0;
+    w.regular = 0;
 //if sought_positions
     w.positions = w.block->position;
 //else
@@ -235,9 +238,10 @@ static void ha_newton_accept(ha_model *m, int number)
     m->fresh[number] = 0;
     m->settled[number] = 0;
 //else
-    /* Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more. */
+    /* Where the block reads the same, it goes on from itself; positions are refined, and their way is looked at, once more where
+     * the Jacobian may be singular near by. */
 //if sought_positions
-    m->fresh[number] = m->fresh[number] && !k.block->position;
+    m->fresh[number] = m->fresh[number] && (m->motion_regular[number] || !k.block->position);
 //end
     m->settled[number] = m->fresh[number];
 //end
