@@ -96,6 +96,25 @@ fn no_flight_is_lost_without_a_word() {
     }
 }
 
+/// Nor where friction turns round, or ends, before it is back.
+#[test]
+fn no_flight_is_lost_where_friction_changes_its_branch() {
+    let text = "model M\nSe:push(10) -> 1:v -> I:mass(2)\nv -> R:pad(friction = 5)\nstate x' = v.f from 0\n\
+                when x > 0.1 { reset mass.f = -0.5*mass.f }\n";
+    for (method, step) in [
+        (Method::Explicit, None),
+        (Method::Radau, None),
+        (Method::Fixed(FixedMethod::Rk4), Some(1e-3)),
+        (Method::Fixed(FixedMethod::LinearlyImplicitBdf2), Some(1e-3)),
+    ] {
+        let stopped = stopped(text, &Run { method, step, ..exact(2.0) });
+        let told = matches!(stopped.failure, Failure::Accumulation { .. } | Failure::Lost { .. });
+        assert!(told, "{method:?}: {}", stopped.failure);
+        let most = column(&stopped.trace, "x").iter().copied().fold(0.0, f64::max);
+        assert!(near(most, 0.1, 1e-6), "{method:?}: it is at {most}");
+    }
+}
+
 #[test]
 fn steps_of_fixed_length_are_cut_short_at_impacts() {
     let first = (2.0f64 / 9.81).sqrt();

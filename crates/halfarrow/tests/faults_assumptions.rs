@@ -238,7 +238,7 @@ fn random_graphs_give_in_a_sweep_what_they_give_alone() {
     let mut draw = Draw(7);
     let (mut compared, mut anew, mut failed) = (0, 0, 0);
     let method = Method::Fixed(FixedMethod::ImplicitMidpoint);
-    for _ in 0..36 {
+    for _ in 0..20 {
         let text = random_graph(&mut draw);
         let Ok(model) = Model::from_text("random.bond", &text, &[]) else { continue };
         if alone(&text, &[], "m.f", method).is_none() {
@@ -263,5 +263,5 @@ fn random_graphs_give_in_a_sweep_what_they_give_alone() {
             assert!(agree, "{row:?}, alone {wanted:?}\n{text}");
         }
     }
-    assert!(compared > 600 && anew > 60 && failed < compared / 2, "{compared} compared, {anew} anew, {failed} failed");
+    assert!(compared > 300 && anew > 30 && failed < compared / 2, "{compared} compared, {anew} anew, {failed} failed");
 }

@@ -296,7 +296,7 @@ fn no_form_of_a_random_graph_panics() {
             assert!(fault(name).equations(form).is_ok(), "{name} {}", form.name());
         }
     }
-    let count = std::env::var("HALFARROW_GRAPHS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+    let count = std::env::var("HALFARROW_GRAPHS").ok().and_then(|n| n.parse().ok()).unwrap_or(30);
     let (mut random, mut derived) = (Random(7), 0);
     for number in 0..count {
         let graph = graph(&mut random);

@@ -154,6 +154,26 @@ when spring.e > 1.5 - 1e-9 { n = n + 1; t1 = if n == 3 then t else t1; t2 = if n
 
 /// What the discs of a clutch have together stays to the last digits, and they turn as one from the time on that the torque
 /// needs.
+/// What sticks is let go by the impulse of a reset, and slides the way that it is pushed.
+#[test]
+fn a_reset_lets_go_what_sticks() {
+    let machine = |speed: f64| {
+        format!(
+            "Se:push(3) -> 1:v -> I:mass(2)\nv -> R:pad(friction = 5)\nstate x' = v.f from 0\n\
+             when t > 1 {{ reset mass.f = {speed} }}\n"
+        )
+    };
+    let ends = last(&run(&machine(2.0), &to(2.0, &["mass.f", "x", "mass.impulse"])));
+    close(ends[0], 1.0, 1e-12);
+    close(ends[1], 1.5, 1e-12);
+    close(ends[2], 4.0, 1e-12);
+    // It comes to rest at 1.5 s, and sticks again.
+    let ends = last(&run(&machine(-2.0), &to(2.0, &["mass.f", "x", "pad.e"])));
+    assert_eq!(ends[0], 0.0);
+    close(ends[1], -0.5, 1e-12);
+    close(ends[2], 3.0, 1e-12);
+}
+
 #[test]
 fn clutch() {
     let text = "1:a -> I:j1(1, f0 = 30)\n1:b -> I:j2(2)\na -> 0:slip -> b\nslip -> R:pad(friction = 10)\n";

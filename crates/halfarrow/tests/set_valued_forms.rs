@@ -258,7 +258,7 @@ fn verdict((text, names): &Machine, to: f64, within: f64, form: Form) -> (Verdic
 fn some() {
     let mut faults = Vec::new();
     // In the last one scales of states came from rounding.
-    for seed in (0..3).chain([553]) {
+    for seed in (0..2).chain([553]) {
         for (kind, machine, within) in machines(seed) {
             for form in FORMS {
                 let (verdict, told) = verdict(&machine, 4.0, within_of(form, within), form);

@@ -9,6 +9,11 @@ impl BondGraph {
         self.elements.values().any(|element| element.kind.moduli().into_iter().any(|m| self.exprs.may_leap(m)))
     }
 
+    /// Whether a set-valued law is in a branch that an impulse ends, as one that sticks.
+    pub fn may_be_released(&self) -> bool {
+        self.set_valued.iter().any(|law| law.branch().released.is_some())
+    }
+
     /// The expressions of laws, signals, named values, constraints and guesses.
     pub(super) fn expressions(&self) -> Vec<Expr> {
         let mut all: Vec<Expr> =

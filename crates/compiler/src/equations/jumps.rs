@@ -94,7 +94,8 @@ impl Assembled<'_> {
                     along => along?,
                 },
             };
-            if along.is_empty() && of_bound {
+            // Nor does what a branch holds: an impulse lets it go first, and acts in another branch.
+            if along.is_empty() && (of_bound || graph.may_be_released()) {
                 continue;
             }
             if along.is_empty() {

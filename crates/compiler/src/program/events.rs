@@ -107,6 +107,16 @@ pub enum Target {
         /// The impulse.
         impulse: u32,
     },
+    /// A value that the branch of a set-valued law holds, as what sticks: an impulse lets it go first, so that it changes in
+    /// another mode.
+    HeldByBranch,
+}
+
+impl Target {
+    /// Whether impulses bring it about.
+    pub fn takes_impulse(self) -> bool {
+        matches!(self, Target::Moved { .. } | Target::HeldByBranch)
+    }
 }
 
 /// How storages change at events: `Σ factor · (X⁺ - X⁻) = Σ along · P` for each independent variable, all factors as they
@@ -203,8 +213,10 @@ fn target(lower: &mut Lowering, equations: &Equations, action: &bond_graph::Acti
         Some(Meaning::Signal(_)) => state(action.target).map(Target::Signal),
         _ => {
             let of = |i: &equations::Impulse| Some(i.symbol) == action.impulse;
-            let impulse = equations.jumps.as_ref()?.impulses.iter().position(of)? as u32;
-            Some(Target::Moved { what: lower.defined(action.target)?, impulse })
+            match equations.jumps.as_ref()?.impulses.iter().position(of) {
+                Some(impulse) => Some(Target::Moved { what: lower.defined(action.target)?, impulse: impulse as u32 }),
+                None => equations.graph.may_be_released().then_some(Target::HeldByBranch),
+            }
         }
     }
 }

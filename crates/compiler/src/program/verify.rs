@@ -188,6 +188,7 @@ fn events(p: &Program) -> Result<(), String> {
             Target::Discrete(i) => p.held.get(i as usize).is_some_and(|h| h.kind.is_discrete()),
             Target::Signal(i) => (i as usize) < p.states.len(),
             Target::Moved { impulse, .. } => (impulse as usize) < impulses,
+            Target::HeldByBranch => p.set_valued.iter().any(|law| law.released.is_some()),
         };
         all(fine, || format!("an event changes {:?}, which there is not", action.target))?;
     }

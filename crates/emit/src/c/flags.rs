@@ -133,7 +133,8 @@ flags! {
     /// Gaps among their bounds; such whose sides meet with an impulse, in this mode and in any.
     gaps
     meets
-    contacts
+    /// Impulses may open contacts and let go what sticks.
+    releases
     /// Impulses balanced where ratios leap or modes change.
     leaps_balanced
 }

@@ -207,16 +207,15 @@ fn of_clauses(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Real, &["new_values"], events.actions(), "what they change");
         let returns = events.returning.len();
         if returns > 0 {
-            list.one(Kind::Int, &["returns_due"], "whether what has happened is on its way back");
-            list.one(Kind::Wide, &["returns_since"], "when it happened");
-            list.arrays(Kind::Int, &["returning"], returns, "of which conditions");
+            list.one(Kind::Wide, &["returns_since"], "when conditions held whose numbers are on their way back");
+            list.arrays(Kind::Int, &["returning"], p.clauses.len(), "whether they are");
             list.arrays(
                 Kind::Real,
                 &["returning_from", "returning_way"],
-                returns,
-                "operands then, and the way they go",
+                p.clauses.len(),
+                "numbers then, and their way",
             );
-            list.arrays(Kind::Real, &["returning_out", "returning_rates"], returns, "");
+            list.arrays(Kind::Real, &["returns_out", "returns_rates"], returns, "");
         }
     }
     if plan.locates() {

@@ -14,9 +14,9 @@ pub(super) fn main(export: &Export, name: &str) -> String {
     let recorded: Vec<&Observed> = export.recorded.iter().map(|&i| &export.program.observed[i]).collect();
     let quoted = |text: &str| if text.contains(',') { format!("\"{text}\"") } else { text.to_string() };
     let field = |text: &str| format!(",{}", messages::escaped(&quoted(text))).replace('%', "%%");
-    let names: String = recorded.iter().map(|o| field(&o.name)).collect();
+    let names = printed(recorded.iter().map(|o| field(&o.name)), "    ");
     let unit = |o: &Observed| o.unit.as_ref().map(ToString::to_string).unwrap_or_default();
-    let units: String = recorded.iter().map(|o| field(&unit(o))).collect();
+    let units = printed(recorded.iter().map(|o| field(&unit(o))), "        ");
     let print = |(i, o): (usize, &&Observed)| {
         let (digits, value) = match export.real {
             Real::Double => (17, format!("m->y[{i}]")),
@@ -28,6 +28,19 @@ pub(super) fn main(export: &Export, name: &str) -> String {
     let words = [("PRINT_OUTPUTS", lines.join("\n")), ("OUTPUT_NAMES", names), ("OUTPUT_UNITS", units)];
     let words = words.map(|(word, text)| (word, Written::of(text))).into();
     filling(name, words).text(include_str!("runtime/main.c"))
+}
+
+/// Fields in lines that print some of them each: compilers need not take strings of more than 4,095 characters.
+fn printed(fields: impl Iterator<Item = String>, indent: &str) -> String {
+    let mut lines = vec![String::new()];
+    for field in fields {
+        if lines[lines.len() - 1].len() + field.len() > 100 {
+            lines.push(String::new());
+        }
+        *lines.last_mut().expect("there is one") += &field;
+    }
+    let print = |fields: String| format!("{indent}printf(\"{fields}\");");
+    lines.into_iter().filter(|line| !line.is_empty()).map(print).collect::<Vec<_>>().join("\n")
 }
 
 /// With what templates are filled that compute nothing.

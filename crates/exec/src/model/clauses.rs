@@ -9,7 +9,7 @@ use super::impulses::{ImpulseBalance, ImpulseWork};
 use super::positions::PositionConstraints;
 use super::{DelayOrSample, Model};
 use crate::bytecode::{Hold, Layout, Routine};
-use halfarrow_compiler::program::{Op, Program, Target, Trigger, Value};
+use halfarrow_compiler::program::{Program, Target, Trigger, Value};
 use halfarrow_sim::{Affected, Failure};
 
 /// Rounds at one instant at most.
@@ -83,8 +83,7 @@ pub(super) struct Return {
     clause: usize,
     /// When it happened, in s.
     since: f64,
-    /// The place of the number among the indicators, its value then, and the way that it goes.
-    indicator: usize,
+    /// The value of the number then, and the way that it goes.
     value: f64,
     way: f64,
 }
@@ -197,39 +196,37 @@ impl Model {
     }
 
     /// Notes which conditions have made something happen at `(t, x)` and are about to hold no longer: a ball that has hit the
-    /// floor leaves it.
+    /// floor leaves it. Where none has, what is to return from before is watched further on.
     pub(super) fn note_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
-        self.run.returns.clear();
         let code = self.code.clone();
         let happened = |clause: &usize| match self.run.clauses[*clause] {
             ClauseMemory::Becomes(condition) => condition.holds_since(t),
             ClauseMemory::Every { .. } => false,
         };
-        let indicator = |clause: usize| match code.program.values.op(code.program.clauses[clause].trigger.value()) {
-            Op::Sign(condition, _) => code.switching.iter().position(|c| *c == condition),
-            _ => None,
-        };
         let own = code.clauses.conditional.iter().copied().filter(|c| code.program.clauses[*c].bound.is_none());
-        let mut returns = std::mem::take(&mut self.run.returns);
-        let watched = own.filter(happened).filter_map(|clause| Some((clause, indicator(clause)?)));
-        returns.extend(watched.map(|(clause, indicator)| Return { clause, since: t, indicator, value: 0.0, way: 0.0 }));
-        if !returns.is_empty() {
-            self.rates_at(t, x)?;
-            self.place(t, x);
-            self.move_along(t);
-            self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
-            returns.retain_mut(|r| {
-                let register = code.indicators.outputs[r.indicator] as usize;
-                let rate = self.frame.d[register];
-                (r.value, r.way) = (self.frame.r[register], rate.signum());
-                rate != 0.0 && r.value * rate <= 0.0
-            });
+        let mut watched = own.filter(happened).filter(|clause| code.sign_of(*clause).is_some()).peekable();
+        if watched.peek().is_none() {
+            return Ok(());
         }
+        let mut returns = std::mem::take(&mut self.run.returns);
+        returns.clear();
+        returns.extend(watched.map(|clause| Return { clause, since: t, value: 0.0, way: 0.0 }));
+        self.rates_at(t, x)?;
+        self.place(t, x);
+        self.move_along(t);
+        self.frame.run_along(&code.indicators).map_err(|error| self.failure(t, error))?;
+        returns.retain_mut(|r| {
+            let register = code.sign_of(r.clause).expect("it is watched") as usize;
+            let rate = self.frame.d[register];
+            (r.value, r.way) = (self.frame.r[register], rate.signum());
+            rate != 0.0 && r.value * rate <= 0.0
+        });
         self.run.returns = returns;
         Ok(())
     }
 
-    /// What was about to return and is further beyond at the end of a step has been lost.
+    /// What was about to return and is further beyond at the end of a step has been lost. What is neither that nor back is
+    /// watched further on.
     pub(super) fn watch_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.run.returns.is_empty() || self.run.returns.iter().any(|r| r.since == t) {
             return Ok(());
@@ -237,15 +234,19 @@ impl Model {
         let code = self.code.clone();
         self.place(t, x);
         self.frame.run(&code.indicators).map_err(|error| self.failure(t, error))?;
-        for r in &self.run.returns {
-            let value = self.frame.r[code.indicators.outputs[r.indicator] as usize];
-            if value * r.way < 0.0 && value.abs() > r.value.abs() {
-                let what = code.program.clauses[r.clause].name.clone();
-                return Err(Failure::Lost { time: t, what, since: r.since });
-            }
-        }
-        self.run.returns.clear();
-        Ok(())
+        let Model { run, frame, .. } = self;
+        let mut lost = None;
+        run.returns.retain(|r| {
+            let Some(register) = code.sign_of(r.clause) else { return true };
+            let value = frame.r[register as usize];
+            let beyond = value * r.way < 0.0;
+            lost = lost.or((beyond && value.abs() > r.value.abs()).then_some(*r));
+            beyond
+        });
+        lost.map_or(Ok(()), |r| {
+            let what = code.program.clauses[r.clause].name.clone();
+            Err(Failure::Lost { time: t, what, since: r.since })
+        })
     }
 
     /// Which conditions become true at `(t, x)`, without taking notice of it.
@@ -432,7 +433,7 @@ impl Model {
                     self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at])
                 }
                 Target::Signal(i) => x[i as usize] = work.values[at],
-                Target::Moved { .. } => {}
+                Target::Moved { .. } | Target::HeldByBranch => {}
             }
         }
         self.events = work;

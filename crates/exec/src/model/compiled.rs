@@ -10,7 +10,7 @@ use super::margins::Bounds;
 use super::positions::{Motion, PositionConstraints};
 use crate::bytecode::{BlockBatches, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{BlockId, ConditionId, EventTrigger, JacobianEntry, Program, Value};
+use halfarrow_compiler::program::{BlockId, ConditionId, EventTrigger, JacobianEntry, Op, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -304,6 +304,15 @@ impl Mode {
             layout,
             program,
         }
+    }
+
+    /// The register of the number whose sign the condition of a clause is, if it is one of the state.
+    pub fn sign_of(&self, clause: usize) -> Option<u32> {
+        let Op::Sign(condition, _) = self.program.values.op(self.program.clauses[clause].trigger.value()) else {
+            return None;
+        };
+        let place = self.switching.iter().position(|c| *c == condition)?;
+        Some(self.indicators.outputs[place])
     }
 
     /// Everything that runs on registers.

@@ -286,7 +286,6 @@ impl Model {
         run.pivots.clear();
         run.determinants.clear();
         run.determinants.reserve(code.motion.as_ref().map_or(0, |motion| motion.blocks.len()));
-        run.returns.clear();
         self.events = EventWork::of(&code);
         self.tiers = Tiers::default();
         self.projection = None;

@@ -9,7 +9,7 @@ use super::compiled::ModeId;
 use super::margins::{Bounds, Standing};
 use crate::bytecode::Hold;
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Clause, Exchanged, Margin, Program, Target};
+use halfarrow_compiler::program::{Clause, Exchanged, Margin, Program};
 use halfarrow_sim::Failure;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -251,9 +251,12 @@ impl Model {
         let Some(bounds) = &code.bounds else { return Ok(()) };
         let laws = &code.program.set_valued;
         let free: Vec<u32> = laws.iter().map(|law| law.released.unwrap_or(law.present)).collect();
-        let impulses = code.program.clauses.iter().zip(&self.events.fired).any(|(clause, fired)| {
-            *fired && clause.actions.iter().any(|action| matches!(action.target, Target::Moved { .. }))
-        });
+        let impulses = code
+            .program
+            .clauses
+            .iter()
+            .zip(&self.events.fired)
+            .any(|(clause, fired)| *fired && clause.actions.iter().any(|action| action.target.takes_impulse()));
         if !impulses || free == bounds.branches {
             return Ok(());
         }

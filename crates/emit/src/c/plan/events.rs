@@ -6,7 +6,7 @@ use crate::c::header::comment;
 use crate::c::written::{Needed, Notes, Part, Written, written};
 
 /// What an action changes, as in `runtime/events.c`.
-const KINDS: [&str; 3] = ["HA_DISCRETE", "HA_SIGNAL", "HA_MOVED"];
+const KINDS: [&str; 4] = ["HA_DISCRETE", "HA_SIGNAL", "HA_MOVED", "HA_HELD_BY_BRANCH"];
 
 /// What happens at events.
 #[derive(Debug, Clone, Default)]
@@ -46,6 +46,7 @@ impl EventTables {
             Target::Moved { what, impulse } => {
                 (2, moved.binary_search(&what).expect("it is among what resets change"), impulse as usize)
             }
+            Target::HeldByBranch => (3, 0, 0),
         };
         let sign = |trigger| match (trigger, program.values.op(Trigger::value(trigger))) {
             (Trigger::Becomes(_), Op::Sign(condition, _)) => Some(&program.conditions[condition]),

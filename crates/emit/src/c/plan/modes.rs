@@ -25,7 +25,7 @@ pub(in crate::c) struct Modes {
     /// Variables of the machine that are carried from mode to mode.
     symbols: Vec<Symbol>,
     groups: usize,
-    contacts: bool,
+    releases: bool,
     /// Variables that may be independent; which of them are, in each mode.
     exchanged: Vec<Symbol>,
     independent: Vec<Vec<usize>>,
@@ -55,7 +55,8 @@ impl Modes {
             keys: keys.into_iter().collect(),
             symbols: symbols.into_iter().collect(),
             groups: all[0].compared.len(),
-            contacts: all.iter().flat_map(|b| &b.margins).any(|m| m.meets),
+            releases: programs.iter().any(|p| p.set_valued.iter().any(|law| law.released.is_some()))
+                && programs.iter().flat_map(|p| &p.clauses).flat_map(|c| &c.actions).any(|a| a.target.takes_impulse()),
             exchanged,
             independent,
         }
@@ -71,9 +72,9 @@ impl Modes {
         self.exchanged.len()
     }
 
-    /// Whether sides of contacts meet with impulses in any mode.
-    pub fn has_contacts(&self) -> bool {
-        self.contacts
+    /// Whether impulses may open contacts and let go what sticks.
+    pub fn releases(&self) -> bool {
+        self.releases
     }
 
     pub fn laws(&self) -> usize {

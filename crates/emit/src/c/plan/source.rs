@@ -197,7 +197,7 @@ impl Plan<'_> {
             bounds: bounds.is_some(),
             gaps: bounds.is_some_and(ModeTables::has_gaps),
             meets: bounds.is_some_and(ModeTables::meets),
-            contacts: bounds.is_some_and(|b| b.modes.has_contacts()),
+            releases: bounds.is_some_and(|b| b.modes.releases()),
             leaps_balanced: bounds.is_some() || p.jumps.as_ref().is_some_and(|jumps| jumps.leaps),
             linear_constant: self.sizes.factored > 0,
             step_order: self.step_order.is_some(),

@@ -153,9 +153,6 @@ static int ha_enter(ha_model *m, double t, $real *x, $real *leap)
     m->pivots_known = 0;
 //end
     $ha_fill(m->floors, $0.0, $CONDITIONS);
-//if returns
-    m->returns_due = 0;
-//end
     status = $ha_parameters(m);
     if (status != $MODEL_OK) {
         return status;
@@ -264,9 +261,6 @@ static int ha_enter_at(ha_model *m, double t, $real *x)
     int status;
     m->failure.code = $MODEL_OK;
     m->pivots_known = 0;
-//if returns
-    m->returns_due = 0;
-//end
 //if bounds
     $ha_fill(m->floors, $0.0, $CONDITIONS);
 //end

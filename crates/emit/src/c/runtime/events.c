@@ -7,7 +7,9 @@ enum {
     /* What an action changes. */
     HA_DISCRETE,
     HA_SIGNAL,
-    HA_MOVED
+    HA_MOVED,
+    /* What a branch holds: another mode changes it. */
+    HA_HELD_BY_BRANCH
 };
 
 //item ha_action_starts
@@ -108,6 +110,9 @@ static int ha_begin_clauses(ha_model *m, double t, const $real *x)
         m->clauses[i].last = -HUGE_VAL;
         m->clauses[i].interval = HUGE_VAL;
         m->clauses[i].faster = 0;
+//if returns
+        m->returning[i] = 0;
+//end
     }
 //if periodic_clauses
     {

@@ -20,9 +20,13 @@ int main(int argc, char **argv)
     const long every = argc > 2 ? strtol(argv[2], NULL, 10) : 1;
     long steps = 0;
     int status = $model_reset(&m);
-    printf("t$OUTPUT_NAMES\n");
+    printf("t");
+$OUTPUT_NAMES
+    printf("\n");
     if (argc > 3 && strcmp(argv[3], "units") == 0) {
-        printf("s$OUTPUT_UNITS\n");
+        printf("s");
+$OUTPUT_UNITS
+        printf("\n");
     }
     if (status == $MODEL_OK) {
         status = $model_start(&m, 0.0);

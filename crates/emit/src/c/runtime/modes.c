@@ -294,7 +294,7 @@ static int ha_settle(ha_model *m, double t, $real *x, int *switched)
     return status;
 }
 
-//if contacts
+//if releases
 //item ha_release
 /* Opens contacts and lets go what sticks, before impulses are shared out among all that move: what they take of it is found then. */
 static int ha_release(ha_model *m, double t, $real *x)
@@ -345,7 +345,7 @@ static int ha_run_rounds(ha_model *m, double t, $real *x)
     int turn;
     int status = $MODEL_OK;
     for (turn = 0; turn < 200 && status == $MODEL_OK && $ha_first_fired(m) >= 0; ++turn) {
-//if contacts
+//if releases
         status = $ha_release(m, t, x);
 //end
         if (status == $MODEL_OK) {

@@ -223,7 +223,7 @@ static int ha_round(ha_model *m, double t, $real *x, int first)
 }
 
 //if bounds
-//if contacts
+//if releases
 //item ha_bound_of
 /* The law and the branch beyond of each clause that is the end of a branch. */
 static const int ha_bound_of[][2] = {
@@ -234,19 +234,15 @@ $BOUND_TABLE
 /* Whether something that happens takes an impulse. */
 static int ha_resets(const ha_model *m)
 {
-//if resets
     int i;
     int a;
     for (i = 0; i < $CLAUSES; ++i) {
         for (a = $ha_action_starts[i]; m->clauses[i].fired && a < $ha_action_starts[i + 1]; ++a) {
-            if ($ha_action_kinds[a] == HA_MOVED) {
+            if ($ha_action_kinds[a] == HA_MOVED || $ha_action_kinds[a] == HA_HELD_BY_BRANCH) {
                 return 1;
             }
         }
     }
-//else
-    (void)m;
-//end
     return 0;
 }
 

@@ -300,7 +300,7 @@ impl Model {
             match target {
                 Target::Discrete(i) => variation.held[j][i as usize] = variation.values[j][at],
                 Target::Signal(i) => variation.states[j][i as usize] = variation.values[j][at],
-                Target::Moved { .. } => {}
+                Target::Moved { .. } | Target::HeldByBranch => {}
             }
         }
     }
