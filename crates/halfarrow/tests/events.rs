@@ -115,6 +115,17 @@ fn no_flight_is_lost_where_friction_changes_its_branch() {
     }
 }
 
+/// What an impact leaves far beyond a border may turn round on its way back to it.
+#[test]
+fn what_turns_round_far_from_the_border_is_not_lost() {
+    let text = "model M\n1:v -> I:m(1, f0 = 1)\nSe:u(if t < 0.6 then 1 else -1) -> v\nstate x' = v.f from 0\ndiscrete n = 0\n\
+                when x > 0.4 { reset m.f = -1 }\nwhen v.f < -0.2 { n = n + 1 }\n";
+    for (method, step) in [(Method::Explicit, None), (Method::Fixed(FixedMethod::Rk4), Some(1e-2))] {
+        let found = trace(text, &Run { method, step, ..exact(2.0) });
+        assert_eq!(column(&found, "n").last(), Some(&1.0), "{method:?}");
+    }
+}
+
 #[test]
 fn steps_of_fixed_length_are_cut_short_at_impacts() {
     let first = (2.0f64 / 9.81).sqrt();

@@ -225,8 +225,8 @@ impl Model {
         Ok(())
     }
 
-    /// What was about to return and is further beyond at the end of a step has been lost. What is neither that nor back is
-    /// watched further on.
+    /// What was about to return and is further beyond at the end of a step has been lost. What has not moved at all is watched
+    /// further on.
     pub(super) fn watch_returns(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {
         if self.run.returns.is_empty() || self.run.returns.iter().any(|r| r.since == t) {
             return Ok(());
@@ -241,7 +241,7 @@ impl Model {
             let value = frame.r[register as usize];
             let beyond = value * r.way < 0.0;
             lost = lost.or((beyond && value.abs() > r.value.abs()).then_some(*r));
-            beyond
+            value == r.value
         });
         lost.map_or(Ok(()), |r| {
             let what = code.program.clauses[r.clause].name.clone();

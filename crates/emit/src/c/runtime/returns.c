@@ -43,7 +43,7 @@ static int ha_note_returns(ha_model *m, double t, const $real *x)
 }
 
 //item ha_watch_returns
-/* What was about to return and is further beyond at the end of a step has been lost. What is neither that nor back is watched further on. */
+/* What was about to return and is further beyond at the end of a step has been lost. What has not moved at all is watched further on. */
 static int ha_watch_returns(ha_model *m, double t, const $real *x)
 {
     int due = 0;
@@ -63,12 +63,10 @@ static int ha_watch_returns(ha_model *m, double t, const $real *x)
     for (i = 0; i < $RETURNS && status == $MODEL_OK; ++i) {
         const int clause = $ha_returning[i];
         const $real value = m->returns_out[i];
-        if (m->returning[clause]) {
-            m->returning[clause] = value * m->returning_way[clause] < $0.0;
-            if (m->returning[clause] && $fabs(value) > $fabs(m->returning_from[clause])) {
-                status = $ha_fail(m, $MODEL_LOST, clause, t);
-            }
+        if (m->returning[clause] && value * m->returning_way[clause] < $0.0 && $fabs(value) > $fabs(m->returning_from[clause])) {
+            status = $ha_fail(m, $MODEL_LOST, clause, t);
         }
+        m->returning[clause] = m->returning[clause] && value == m->returning_from[clause];
     }
     return status;
 }
