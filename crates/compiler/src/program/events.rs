@@ -180,7 +180,10 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
         };
         let mut actions = Vec::new();
         for action in &clause.actions {
-            let Some(target) = target(lower, equations, action) else { continue };
+            // What ends a branch and moves nothing has no action.
+            let held = clause.bound.is_none() && equations.jumps.is_some() && graph.may_be_released();
+            let target = target(lower, equations, action).or(held.then_some(Target::HeldByBranch));
+            let Some(target) = target else { continue };
             actions.push(Action { name: action.name.clone(), target, value: lower.value(action.value) });
         }
         let bound = clause.bound.map(|(law, number)| {
@@ -213,10 +216,8 @@ fn target(lower: &mut Lowering, equations: &Equations, action: &bond_graph::Acti
         Some(Meaning::Signal(_)) => state(action.target).map(Target::Signal),
         _ => {
             let of = |i: &equations::Impulse| Some(i.symbol) == action.impulse;
-            match equations.jumps.as_ref()?.impulses.iter().position(of) {
-                Some(impulse) => Some(Target::Moved { what: lower.defined(action.target)?, impulse: impulse as u32 }),
-                None => equations.graph.may_be_released().then_some(Target::HeldByBranch),
-            }
+            let impulse = equations.jumps.as_ref()?.impulses.iter().position(of)? as u32;
+            Some(Target::Moved { what: lower.defined(action.target)?, impulse })
         }
     }
 }
