@@ -182,6 +182,7 @@ pub(super) fn clauses(lower: &mut Lowering, equations: &Equations) -> Vec<Clause
         for action in &clause.actions {
             // What ends a branch and moves nothing has no action.
             let held = clause.bound.is_none() && equations.jumps.is_some() && graph.may_be_released();
+            let held = held && action.impulse.is_some();
             let target = target(lower, equations, action).or(held.then_some(Target::HeldByBranch));
             let Some(target) = target else { continue };
             actions.push(Action { name: action.name.clone(), target, value: lower.value(action.value) });
