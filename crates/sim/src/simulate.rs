@@ -42,9 +42,14 @@ fn fixed(
     x: &mut [f64],
     work: &mut Work,
 ) -> Result<(), Failure> {
+    let mut begins = true;
     loop {
         let mut method = FixedStep::of_blocks(method, system.sparsity(), system.blocks());
-        let mut ticks = Ticks::new(&mut method, Counted::new(system), (run.options.from, step));
+        let mut counted = Counted::new(system);
+        if std::mem::take(&mut begins) {
+            method.prepare(&mut counted, run.time, step, x);
+        }
+        let mut ticks = Ticks::new(&mut method, counted, (run.options.from, step));
         let end = run.drive(&mut ticks, x);
         work.add(ticks.system().work());
         // Where it hands over, its states are others.

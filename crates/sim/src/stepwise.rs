@@ -66,9 +66,8 @@ impl Stepwise {
     }
 
     /// Does beforehand what only the first step, of length `h` in s, takes.
-    #[allow(clippy::result_large_err, reason = "a run fails once")]
-    pub(crate) fn prepare(&mut self, system: &mut dyn HybridSystem, h: f64, x: &[f64]) -> Result<(), Stopped> {
-        self.method.prepare(system, self.position.time(), h, x).map_err(|failure| self.stopped(failure))
+    pub(crate) fn prepare(&mut self, system: &mut dyn HybridSystem, h: f64, x: &[f64]) {
+        self.method.prepare(system, self.position.time(), h, x);
     }
 
     /// A step of length `h` in s from where the run stands, which moves nothing but `x`.

@@ -109,6 +109,8 @@ flags! {
     keeps_steps
     /// They compare rates in place of exact derivatives.
     compares_rates
+    /// They find a new Jacobian over several steps.
+    finds_by_parts
     time_passes
     /// Linear blocks with a constant matrix.
     linear_constant

@@ -399,7 +399,15 @@ fn of_kept_steps(list: &mut List, plan: &Plan) {
     list.one(Kind::Int, &["jacobian_known", "jacobian_doubted", "jacobian_steps"], about);
     list.arrays(Kind::Real, &["before_from", "before_rates"], nx, "the step before");
     list.arrays(Kind::Real, &["last_from", "last_rates"], nx, "the step made last");
-    list.arrays(Kind::Real, &["point", "way", "move_on"], nx, "");
+    list.arrays(Kind::Real, &["point", "way", "move_on", "at"], nx, "");
+    if plan.compares_rates() {
+        list.arrays(Kind::Real, &["rates_at"], nx, "");
+    }
+    if plan.groups_a_step().is_some() {
+        list.arrays(Kind::Real, &["next_jacobian"], nonzeros, "the Jacobian that is to follow");
+        list.arrays(Kind::Real, &["next_at"], nx, "the state at which it is found");
+        list.one(Kind::Int, &["next_groups"], "groups of its columns that are to be found yet");
+    }
     list.one(Kind::Wide, &["before_end", "last_end"], "where they ended, and their lengths");
     list.one(Kind::Real, &["before_length", "last_length"], "");
     list.one(Kind::Int, &["before_counts", "last_counts"], "whether they count");

@@ -9,8 +9,10 @@
 //!
 //! So `A` need not be new, nor exact. It is the Jacobian of the first step, until it is another one along the way of the run, by so
 //! much that steps would swing up. That is looked at every [`STEPS_A_LOOK`] steps, after an event, and where a step goes far from
-//! where it was expected, which then is made from there anew. All of it is found anew at once: columns of different age would
-//! lead a machine that moves in a plane out of it.
+//! where it was expected, which then is made from there anew. All columns are found at one state: of different states they would
+//! lead a machine that moves in a plane out of it, and a stiff direction that turns would be another one in each.
+//! Of large systems some columns are found at each of the following steps, so that none of these is a long one; at once only where
+//! the step would go elsewhere.
 //! Systems whose derivatives take long have it by [differences](System::compares_rates) of their rates: one evaluation more,
 //! by code that has just run.
 
@@ -23,6 +25,15 @@ const STEPS_A_LOOK: u32 = 8;
 /// By how much at most a step may be longer than the one before. The formula is stable up to 1 + √2 where each is; a short one
 /// between long ones, up to a sample, does not swing.
 const LONGEST: f64 = 20.0;
+
+/// Groups of columns that are found at each step while the Jacobian is found anew, unless that would take more steps than these.
+const GROUPS_A_STEP: usize = 3;
+const STEPS_TO_FIND: usize = 16;
+
+/// How many of so many groups of columns a step finds while the Jacobian is found anew; none where it finds all.
+fn groups_a_step(groups: usize) -> Option<usize> {
+    (groups > GROUPS_A_STEP).then(|| GROUPS_A_STEP.max(groups.div_ceil(STEPS_TO_FIND)))
+}
 
 /// A step is doubted whose move is another one than that before by so many times that, and by this part of a state.
 const OTHER: f64 = 2.0;
@@ -52,12 +63,34 @@ pub struct History {
     last: Step,
     /// Nonzeros of the Jacobian; none at the beginning.
     jacobian: Vec<f64>,
+    /// The one that is to follow it.
+    next: Next,
     /// What it was multiplied by in the matrix that was factored last; not a number where it is to be factored anew.
     scale: f64,
     /// Steps since it was looked at last.
     steps: u32,
     /// Whether something has happened since the last step.
     event: bool,
+}
+
+/// A Jacobian of which some columns are found at each step, all at one state.
+#[derive(Clone, Debug, PartialEq)]
+struct Next {
+    /// Groups of columns that are to be found yet; 0 where none is wanted.
+    groups: usize,
+    at: Vec<f64>,
+    jacobian: Vec<f64>,
+}
+
+/// What has become of the Jacobian along the rates.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Change {
+    /// It serves.
+    Little,
+    /// Steps would swing up with time.
+    Some,
+    /// The next step goes elsewhere.
+    Much,
 }
 
 /// A step from a time and state on.
@@ -93,15 +126,19 @@ pub(super) struct LinearlyImplicitBdf2 {
     rates: Vec<f64>,
     way: Vec<f64>,
     move_on: Vec<f64>,
+    /// The state at which columns are found, and the rates there.
+    at: Vec<f64>,
+    rates_at: Vec<f64>,
 }
 
 impl LinearlyImplicitBdf2 {
     pub(super) fn new(sparsity: &Sparsity) -> LinearlyImplicitBdf2 {
         let states = sparsity.states();
         let (before, last) = (Step::none(states), Step::none(states));
+        let next = Next { groups: 0, at: vec![0.0; states], jacobian: vec![0.0; sparsity.nonzeros()] };
         let jacobian = Vec::with_capacity(sparsity.nonzeros());
         LinearlyImplicitBdf2 {
-            history: History { before, last, jacobian, scale: f64::NAN, steps: 0, event: false },
+            history: History { before, last, jacobian, next, scale: f64::NAN, steps: 0, event: false },
             groups: sparsity.groups(),
             sparsity: sparsity.clone(),
             matrix: StepMatrix::new(sparsity, 1),
@@ -110,6 +147,8 @@ impl LinearlyImplicitBdf2 {
             rates: vec![0.0; states],
             way: vec![0.0; states],
             move_on: vec![0.0; states],
+            at: vec![0.0; states],
+            rates_at: vec![0.0; states],
         }
     }
 
@@ -155,11 +194,11 @@ impl LinearlyImplicitBdf2 {
         Ok(())
     }
 
-    /// Finds the Jacobian where a run begins, so that the first step does not.
-    pub(super) fn prepare(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> Result<(), Failure> {
-        system.rates(t, x, &mut self.history.last.rates)?;
-        self.renew(system, (t, h), x, false);
-        Ok(())
+    /// Finds the Jacobian where a run begins, so that the first step does not. Where there are no rates, that step tells.
+    pub(super) fn prepare(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
+        if system.rates(t, x, &mut self.history.last.rates).is_ok() {
+            self.renew(system, (t, h), x, false);
+        }
     }
 
     /// A step without a trace, apart from the end.
@@ -182,62 +221,107 @@ impl LinearlyImplicitBdf2 {
     fn renew(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64], goes_on: bool) {
         let event = std::mem::take(&mut self.history.event);
         self.history.steps += u32::from(goes_on);
-        let History { jacobian, steps, .. } = &self.history;
-        let looks = event || *steps >= STEPS_A_LOOK;
-        if jacobian.is_empty() || (looks && self.is_another(system, (t, h), x)) {
-            self.take_all(system, (t, h), x);
-        }
-        if looks {
+        let History { jacobian, steps, next, .. } = &self.history;
+        let follows = next.groups > 0;
+        if jacobian.is_empty() {
+            self.find_all(system, (t, h), x);
+        } else if event || (!follows && *steps >= STEPS_A_LOOK) {
             self.history.steps = 0;
+            match self.change(system, (t, h), x) {
+                Change::Little => {}
+                Change::Some if groups_a_step(self.groups.len()).is_some() => self.want_next(x),
+                Change::Some | Change::Much => self.find_all(system, (t, h), x),
+            }
+        }
+        if follows {
+            self.find_some(system, (t, h));
         }
     }
 
-    fn take_all(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
-        self.history.jacobian.resize(self.sparsity.nonzeros(), 0.0);
-        (0..self.groups.len()).for_each(|part| self.take_part(system, (t, h), x, part));
-        self.history.steps = 0;
+    /// Finds the Jacobian at once.
+    fn find_all(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
+        let History { jacobian, last, scale, steps, next, .. } = &mut self.history;
+        jacobian.resize(self.sparsity.nonzeros(), 0.0);
+        (*scale, *steps, next.groups) = (f64::NAN, 0, 0);
+        self.at.copy_from_slice(x);
+        self.rates_at.copy_from_slice(&last.rates);
+        let mut values = std::mem::take(jacobian);
+        for group in 0..self.groups.len() {
+            // Where there are no derivatives, or no rates beside the state, they stay as they are.
+            let _ = self.find(system, (t, h), group, &mut values);
+        }
+        self.history.jacobian = values;
     }
 
-    /// Finds a group of columns anew. Where there are no derivatives, or no rates beside the state, they stay as they are.
-    fn take_part(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64], part: usize) {
-        let Some(group) = self.groups.get(part) else { return };
-        let LinearlyImplicitBdf2 { history, sparsity, point, rates, .. } = self;
-        let (values, last) = (&mut history.jacobian, &history.last);
-        history.scale = f64::NAN;
+    /// From now on a Jacobian at this state is found, unless one is.
+    fn want_next(&mut self, x: &[f64]) {
+        let next = &mut self.history.next;
+        if next.groups == 0 {
+            next.groups = self.groups.len();
+            next.at.copy_from_slice(x);
+        }
+    }
+
+    /// Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole.
+    fn find_some(&mut self, system: &mut dyn System, (t, h): (f64, f64)) {
+        let next = &mut self.history.next;
+        let (left, all) = (next.groups, self.groups.len());
+        if left == 0 {
+            return;
+        }
+        let now = groups_a_step(all).unwrap_or(all).min(left);
+        self.at.copy_from_slice(&next.at);
+        let mut values = std::mem::take(&mut next.jacobian);
+        let begun = !system.compares_rates() || system.rates(t, &self.at, &mut self.rates_at).is_ok();
+        let found = begun && (all - left..all - left + now).all(|group| self.find(system, (t, h), group, &mut values));
+        let History { jacobian, next, scale, steps, .. } = &mut self.history;
+        next.jacobian = values;
+        next.groups = if found { left - now } else { 0 };
+        if found && next.groups == 0 {
+            std::mem::swap(jacobian, &mut next.jacobian);
+            (*scale, *steps) = (f64::NAN, 0);
+        }
+    }
+
+    /// Finds a group of columns at the state `self.at`. Whether there were derivatives, or rates beside it.
+    fn find(&mut self, system: &mut dyn System, (t, h): (f64, f64), group: usize, values: &mut [f64]) -> bool {
+        let LinearlyImplicitBdf2 { groups, sparsity, point, rates, at, rates_at, .. } = self;
+        let group = &groups[group];
         let compares = system.compares_rates();
         let found = if compares {
-            point.copy_from_slice(x);
+            point.copy_from_slice(at);
             for &column in group {
-                let size = x[column].abs().max((h * last.rates[column]).abs());
+                let size = at[column].abs().max((h * rates_at[column]).abs());
                 // Away from zero, so that what is the mirror image of something is compared on its mirror image.
                 let beside = BESIDE * size.max(known_size(system, column));
-                point[column] += if x[column] < 0.0 { -beside } else { beside };
+                point[column] += if at[column] < 0.0 { -beside } else { beside };
             }
             system.rates(t, point, rates)
         } else {
             point.fill(0.0);
             group.iter().for_each(|&column| point[column] = 1.0);
-            system.directional_derivative(t, x, point, rates)
+            system.directional_derivative(t, at, point, rates)
         };
         if found.is_err() {
-            return;
+            return false;
         }
         for &column in group {
             for (place, &row) in sparsity.places(column).zip(sparsity.column(column)) {
                 values[place] = match compares {
-                    true => (rates[row] - last.rates[row]) / (point[column] - x[column]),
+                    true => (rates[row] - rates_at[row]) / (point[column] - at[column]),
                     false => rates[row],
                 };
             }
         }
+        true
     }
 
-    /// Whether the Jacobian along the rates is so much another one that a step along them would be.
-    fn is_another(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> bool {
+    /// Looks at the Jacobian along the rates.
+    fn change(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> Change {
         let LinearlyImplicitBdf2 { history, point, rates, way, matrix, .. } = self;
         let History { last, jacobian, scale, .. } = &*history;
         if !self.factored && (scale.is_nan() || matrix.factor_values(system, t, jacobian, *scale).is_err()) {
-            return true;
+            return Change::Much;
         }
         self.factored = true;
         (0..x.len()).for_each(|i| way[i] = h * last.rates[i]);
@@ -250,15 +334,29 @@ impl LinearlyImplicitBdf2 {
         } else {
             system.directional_derivative(t, x, way, rates)
         };
+        if found.is_err() {
+            return Change::Much;
+        }
         for ((row, column), value) in self.sparsity.entries().zip(jacobian) {
             rates[row] -= value * way[column];
         }
         rates.iter_mut().for_each(|rate| *rate *= scale);
         matrix.solve(rates);
-        // Exact derivatives need no size: what is 0 is 0 in them.
-        let size = |i: usize| x[i].abs().max(if compares { known_size(system, i) } else { 0.0 });
-        let counts = |i: usize| way[i].abs().max(SEEN * size(i));
-        found.is_err() || !(0..x.len()).all(|i| rates[i].abs() <= CHANGED * counts(i))
+        let mut change = Change::Little;
+        for i in 0..x.len() {
+            // Exact derivatives need no size: what is 0 is 0 in them.
+            let size = x[i].abs().max(if compares { known_size(system, i) } else { 0.0 });
+            let (other, counts) = (rates[i].abs(), way[i].abs().max(SEEN * size));
+            if other <= CHANGED * counts {
+                continue;
+            }
+            if other <= MUCH * size {
+                change = Change::Some;
+            } else {
+                return Change::Much;
+            }
+        }
+        change
     }
 
     /// Whether the end of a step is far from where the one before leads. `end` has what is added to that.
@@ -279,11 +377,11 @@ impl LinearlyImplicitBdf2 {
         let ratio = h / before.length;
         if before.ends_at(t) && ratio <= LONGEST {
             self.solve_on(system, (t, h), ratio, x, end)?;
-            if !(self.is_doubtful(x, end) && self.is_another(system, (t, h), x)) {
+            if !(self.is_doubtful(x, end) && self.change(system, (t, h), x) != Change::Little) {
                 (0..x.len()).for_each(|i| end[i] = x[i] + (self.move_on[i] + end[i]));
                 return Ok(());
             }
-            self.take_all(system, (t, h), x);
+            self.find_all(system, (t, h), x);
             return self.begin(system, (t, h), 1, x, end);
         }
         self.begin(system, (t, h), 2, x, end)

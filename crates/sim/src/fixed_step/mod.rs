@@ -14,8 +14,8 @@ mod ticks;
 
 use crate::{Affected, Failure, Sparsity, System};
 pub use back::StepBack;
-pub use bdf2::History;
 use bdf2::LinearlyImplicitBdf2;
+pub use bdf2::History;
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 pub(crate) use ticks::{Ticks, target};
@@ -150,13 +150,9 @@ impl FixedStep {
     }
 
     /// Does beforehand what only the first of steps of this length takes.
-    ///
-    /// # Errors
-    /// What the system reports.
-    pub fn prepare(&mut self, system: &mut dyn System, t: f64, h: f64, x: &[f64]) -> Result<(), Failure> {
-        match &mut self.implicit {
-            Some(Implicit::Bdf2(method)) => method.prepare(system, (t, h), x),
-            _ => Ok(()),
+    pub fn prepare(&mut self, system: &mut dyn System, t: f64, h: f64, x: &[f64]) {
+        if let Some(Implicit::Bdf2(method)) = &mut self.implicit {
+            method.prepare(system, (t, h), x);
         }
     }
 

@@ -63,7 +63,7 @@ pub fn run_real_time<S: HybridSystem>(
     let mut run = Stepwise::new(method, 0.0, system).projecting(pace.project);
     let mut values = vec![0.0; system.observed()];
     run.start(system, x)?;
-    run.prepare(system, pace.step, x)?;
+    run.prepare(system, pace.step, x);
     let mut due = clock.now();
     let mut last = f64::INFINITY;
     for tick in 0..pace.ticks.unwrap_or(u64::MAX) {

@@ -350,6 +350,12 @@ impl<'a> Plan<'a> {
     pub fn compares_rates(&self) -> bool {
         self.export.method.keeps_steps() && self.program.is_long()
     }
+
+    /// How many groups of columns of a new Jacobian a step finds, as `halfarrow_sim::fixed_step` does; none where it finds all.
+    pub fn groups_a_step(&self) -> Option<usize> {
+        let groups = self.column_groups().len();
+        (self.export.method.keeps_steps() && groups > 3).then(|| groups.div_ceil(16).max(3))
+    }
 }
 
 fn held(program: &Program, wanted: impl Fn(HeldKind) -> bool) -> Vec<usize> {

@@ -189,6 +189,7 @@ impl Plan<'_> {
             time_derivative,
             keeps_steps: export.method.keeps_steps(),
             compares_rates: self.compares_rates(),
+            finds_by_parts: self.groups_a_step().is_some(),
             time_passes: time_derivative || held || bounds.is_some() || !self.events.returning.is_empty(),
             moves: !p.clauses.is_empty() || mode.is_some(),
             modes: mode.is_some(),

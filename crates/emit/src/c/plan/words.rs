@@ -92,6 +92,7 @@ impl Plan<'_> {
             ("GROUP_STARTS", lines(lengths(&groups))),
             ("GROUP_COLUMNS", lines(flat(&groups))),
             ("GROUPS", groups.len().to_string()),
+            ("GROUPS_A_STEP", self.groups_a_step().unwrap_or(groups.len()).to_string()),
             ("NONZEROS", columns.iter().map(Vec::len).sum::<usize>().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),
             ("COLUMN_ROWS", lines(flat(&columns))),

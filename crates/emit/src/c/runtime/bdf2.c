@@ -19,6 +19,9 @@ static void ha_forget_steps(ha_model *m)
     m->jacobian_doubted = 0;
     m->jacobian_known = 0;
     m->jacobian_steps = 0;
+//if finds_by_parts
+    m->next_groups = 0;
+//end
 }
 
 //item ha_ends_at
@@ -38,30 +41,28 @@ static $real ha_size_at_least(const ha_model *m, int i)
 }
 
 //item ha_beside
-/* How far beside a state the rates are looked at. */
-static $real ha_beside(const ha_model *m, $real h, const $real *x, int i)
+/* How far beside m->at the rates are looked at. */
+static $real ha_beside(const ha_model *m, $real h, int i)
 {
-    const $real size = $ha_max($fabs(x[i]), $fabs(h * m->last_rates[i]));
+    const $real size = $ha_max($fabs(m->at[i]), $fabs(h * m->rates_at[i]));
     return $PART_BESIDE * $ha_max(size, $ha_size_at_least(m, i));
 }
 
 //end
-//item ha_take_part
-/* Finds a group of columns of the Jacobian anew. Where there are no derivatives, or no rates beside the state, they stay as they
- * are. */
-static void ha_take_part(ha_model *m, double t, $real h, const $real *x, int group)
+//item ha_find_columns
+/* Finds a group of columns of the Jacobian at m->at. Whether there were derivatives, or rates beside it. */
+static int ha_find_columns(ha_model *m, double t, $real h, int group, $real *values)
 {
     int status;
     int i;
     int j;
-    m->jacobian_scale = $0.0;
 //if compares_rates
-    $ha_copy(m->point, x, HA_NX);
+    $ha_copy(m->point, m->at, HA_NX);
     for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
         const int column = $ha_group_columns[i];
-        const $real beside = $ha_beside(m, h, x, column);
+        const $real beside = $ha_beside(m, h, column);
         /* Away from zero, so that what is the mirror image of something is compared on its mirror image. */
-        m->point[column] += x[column] < $0.0 ? -beside : beside;
+        m->point[column] += m->at[column] < $0.0 ? -beside : beside;
     }
     status = $model_rates(m, t, m->point, m->product);
 //else
@@ -70,35 +71,38 @@ static void ha_take_part(ha_model *m, double t, $real h, const $real *x, int gro
     for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
         m->point[$ha_group_columns[i]] = $1.0;
     }
-    status = $model_tangent(m, t, x, m->point, m->product);
+    status = $model_tangent(m, t, m->at, m->point, m->product);
 //end
     if (status != $MODEL_OK) {
         m->failure.code = $MODEL_OK;
-        return;
+        return 0;
     }
     for (i = $ha_group_starts[group]; i < $ha_group_starts[group + 1]; ++i) {
         const int column = $ha_group_columns[i];
         for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
             const int row = $ha_column_rows[j];
 //if compares_rates
-            m->jacobian[j] = (m->product[row] - m->last_rates[row]) / (m->point[column] - x[column]);
+            values[j] = (m->product[row] - m->rates_at[row]) / (m->point[column] - m->at[column]);
 //else
-            m->jacobian[j] = m->product[row];
+            values[j] = m->product[row];
 //end
         }
     }
+    return 1;
 }
 
-//item ha_is_another
-/* Whether the Jacobian along the rates is so much another one that a step along them would be. */
-static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
+//item ha_change_along
+/* What has become of the Jacobian along the rates: 0 where it serves, 1 where steps would swing up with time, 2 where the next one
+ * goes elsewhere. */
+static int ha_change_along(ha_model *m, double t, $real h, const $real *x)
 {
+    int change = 0;
     int status;
     int column;
     int i;
     int j;
     if (m->jacobian_scale == $0.0) {
-        return 1;
+        return 2;
     }
     for (i = 0; i < HA_NX; ++i) {
         m->way[i] = h * m->last_rates[i];
@@ -117,7 +121,7 @@ static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
 //end
     if (status != $MODEL_OK) {
         m->failure.code = $MODEL_OK;
-        return 1;
+        return 2;
     }
     for (column = 0; column < HA_NX; ++column) {
         for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
@@ -135,39 +139,106 @@ static int ha_is_another(ha_model *m, double t, $real h, const $real *x)
 //else
         const $real size = $fabs(x[i]);
 //end
-        if (!($fabs(m->product[i]) <= $0.2 * $ha_max($fabs(m->way[i]), $1e-4 * size))) {
-            return 1;
+        const $real other = $fabs(m->product[i]);
+        if (other <= $0.2 * $ha_max($fabs(m->way[i]), $1e-4 * size)) {
+            continue;
         }
+        if (!(other <= $0.1 * size)) {
+            return 2;
+        }
+        change = 1;
     }
-    return 0;
+    return change;
 }
 
-//item ha_take_all
-/* Finds all of the Jacobian anew. */
-static void ha_take_all(ha_model *m, double t, $real h, const $real *x)
+//item ha_find_all
+/* Finds the Jacobian at once. Where there are no derivatives, or no rates beside the state, columns stay as they are. */
+static void ha_find_all(ha_model *m, double t, $real h, const $real *x)
 {
     int group;
     if (!m->jacobian_known) {
         $ha_fill(m->jacobian, $0.0, $NONZEROS);
     }
+    $ha_copy(m->at, x, HA_NX);
+//if compares_rates
+    $ha_copy(m->rates_at, m->last_rates, HA_NX);
+//end
     for (group = 0; group < $GROUPS; ++group) {
-        $ha_take_part(m, t, h, x, group);
+        (void)$ha_find_columns(m, t, h, group, m->jacobian);
     }
+    m->jacobian_scale = $0.0;
     m->jacobian_known = 1;
     m->jacobian_steps = 0;
+//if finds_by_parts
+    m->next_groups = 0;
+//end
 }
 
+//if finds_by_parts
+//item ha_find_some
+/* Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole. */
+static void ha_find_some(ha_model *m, double t, $real h)
+{
+    const int begin = $GROUPS - m->next_groups;
+    const int end = begin + $GROUPS_A_STEP < $GROUPS ? begin + $GROUPS_A_STEP : $GROUPS;
+    int group;
+    $ha_copy(m->at, m->next_at, HA_NX);
+//if compares_rates
+    if ($model_rates(m, t, m->at, m->rates_at) != $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
+        m->next_groups = 0;
+        return;
+    }
+//end
+    for (group = begin; group < end; ++group) {
+        if (!$ha_find_columns(m, t, h, group, m->next_jacobian)) {
+            m->next_groups = 0;
+            return;
+        }
+    }
+    m->next_groups = $GROUPS - end;
+    if (m->next_groups == 0) {
+        $ha_copy(m->jacobian, m->next_jacobian, $NONZEROS);
+        m->jacobian_scale = $0.0;
+        m->jacobian_steps = 0;
+    }
+}
+
+//end
 //item ha_renew
 /* Finds the Jacobian anew where it is due. */
 static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on)
 {
-    const int steps = m->jacobian_steps + goes_on;
-    const int looks = m->jacobian_doubted || steps >= 8;
+//if finds_by_parts
+    const int follows = m->next_groups > 0;
+    const int looks = m->jacobian_doubted || (!follows && m->jacobian_steps + goes_on >= 8);
+//else
+    const int looks = m->jacobian_doubted || m->jacobian_steps + goes_on >= 8;
+//end
     m->jacobian_doubted = 0;
-    m->jacobian_steps = looks ? 0 : steps;
-    if (!m->jacobian_known || (looks && $ha_is_another(m, t, h, x))) {
-        $ha_take_all(m, t, h, x);
+    m->jacobian_steps += goes_on;
+    if (!m->jacobian_known) {
+        $ha_find_all(m, t, h, x);
+    } else if (looks) {
+        const int change = $ha_change_along(m, t, h, x);
+        m->jacobian_steps = 0;
+//if finds_by_parts
+        if (change == 1 && !follows) {
+            m->next_groups = $GROUPS;
+            $ha_copy(m->next_at, x, HA_NX);
+        }
+        if (change == 2) {
+//else
+        if (change) {
+//end
+            $ha_find_all(m, t, h, x);
+        }
     }
+//if finds_by_parts
+    if (follows && m->next_groups) {
+        $ha_find_some(m, t, h);
+    }
+//end
 }
 
 //item ha_factor_kept
@@ -291,13 +362,13 @@ static int ha_solve_step(ha_model *m, double t, $real h, const $real *x)
         if (status != $MODEL_OK) {
             return status;
         }
-        if (!($ha_is_doubtful(m, x) && $ha_is_another(m, t, h, x))) {
+        if (!($ha_is_doubtful(m, x) && $ha_change_along(m, t, h, x))) {
             for (i = 0; i < HA_NX; ++i) {
                 m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
             }
             return $MODEL_OK;
         }
-        $ha_take_all(m, t, h, x);
+        $ha_find_all(m, t, h, x);
         return $ha_begin(m, t, h, 1, x);
     }
     return $ha_begin(m, t, h, 2, x);
@@ -332,4 +403,15 @@ static int ha_method(ha_model *m, double t, $real h, const $real *x)
     m->last_length = h;
     m->last_counts = 1;
     return $MODEL_OK;
+}
+
+//entry ha_prepare
+/* Finds the Jacobian where a run begins, so that the first step does not. Where there are no rates, that step tells. */
+static void ha_prepare(ha_model *m)
+{
+    if ($model_rates(m, m->t, m->x, m->last_rates) == $MODEL_OK) {
+        $ha_renew(m, m->t, $narrow(m->step), m->x, 0);
+    } else {
+        m->failure.code = $MODEL_OK;
+    }
 }

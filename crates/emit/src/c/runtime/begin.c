@@ -74,6 +74,11 @@ int $model_start_from($model *m, double t, const $real *x)
     if (status == $MODEL_OK) {
         status = $model_accept(m, t, m->x);
     }
+//if keeps_steps
+    if (status == $MODEL_OK) {
+        $ha_prepare(m);
+    }
+//end
     return status == $MODEL_OK ? $model_observe(m, t, m->x, m->y) : status;
 }
 
