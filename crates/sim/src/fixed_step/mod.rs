@@ -14,8 +14,8 @@ mod ticks;
 
 use crate::{Affected, Failure, Sparsity, System};
 pub use back::StepBack;
-use bdf2::LinearlyImplicitBdf2;
 pub use bdf2::History;
+use bdf2::LinearlyImplicitBdf2;
 use implicit_midpoint::ImplicitMidpoint;
 use rosenbrock::{LINEARLY_IMPLICIT_EULER, LinearlyImplicit, RODAS3, Rosenbrock};
 pub(crate) use ticks::{Ticks, target};
