@@ -75,6 +75,26 @@ fn c_follows_parameters_and_inputs() {
     });
 }
 
+/// What a step has found at its end serves the next one, also where an input has changed meanwhile that moves nothing which can jump.
+#[test]
+fn c_goes_on_with_what_steps_found_at_their_end() {
+    let text = std::fs::read_to_string(wishbone()).expect("a model").replace("model Wishbone", "model Driven");
+    let more = "input torque = 0\nSe:motor(torque) -> lower.axis\noutput power = motor.e*motor.f\n";
+    let path = common::folder("ahead_models").join("driven.bond");
+    std::fs::write(&path, text + more).expect("a model");
+    let all = [Method::Euler, Method::Rk4, Method::LinearlyImplicitBdf2].map(|method| export(&path, method, 1e-3));
+    for one in &all {
+        let known = one.written.source.contains("ha_find_ahead(m, *end, m->trial)");
+        assert!(known && !one.written.source.contains("m->u[i] != m->u_crossed[i]"), "{}", one.written.name);
+    }
+    let torque = |i: usize| 20.0 * (i * 7 % 11) as f64;
+    let step = "if (i < steps) { \\\n";
+    let text = driver(&all, &|_| (-1, 0.0));
+    assert!(text.contains(step));
+    let text = text.replace(step, &format!("{step}            m.u[0] = 20.0 * (double)(i * 7 % 11); \\\n"));
+    check("ahead", &all, &text, |one| one.step_with(STEPS, |model, i| model.set_input(0, torque(i))));
+}
+
 /// What fails is said with the elements concerned, where the interpreter stops.
 #[test]
 fn c_says_what_fails() {

@@ -15,6 +15,7 @@
 #[macro_use]
 mod op;
 
+mod ahead;
 mod angles;
 mod bounds;
 pub mod calculus;
@@ -42,6 +43,7 @@ mod triggers;
 mod values;
 mod verify;
 
+pub use ahead::RatesAhead;
 pub use bounds::{Bounds, Margin};
 pub use events::{Action, Bound, Clause, Impulse, Jumps, Measure, SetValued, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};

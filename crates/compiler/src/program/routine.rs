@@ -222,8 +222,14 @@ impl Program {
 
     /// The same at the start of a run, where positions are unknowns like the states: they stand before the routine runs.
     pub fn start_routine(&self, wanted: &[Value]) -> Routine {
-        let positions = self.positions.iter().map(|p| p.value).collect();
-        Builder { positions, ..Builder::new(self, false) }.build(wanted, &[])
+        let positions: Vec<Value> = self.positions.iter().map(|p| p.value).collect();
+        self.routine_given(wanted, &positions, &[])
+    }
+
+    /// The same where more values stand before the routine runs, with some divisors guarded.
+    pub(super) fn routine_given(&self, wanted: &[Value], given: &[Value], pivot_guards: &[u32]) -> Routine {
+        let given = given.iter().copied().collect();
+        Builder { given, ..Builder::new(self, false) }.build(wanted, pivot_guards)
     }
 
     /// The same, with all divisors guarded that vary.
@@ -232,7 +238,7 @@ impl Program {
     }
 
     /// The pivot guards of divisors that read parameters alone, or of the others.
-    fn watches_of(&self, parameters: bool) -> Vec<u32> {
+    pub(super) fn watches_of(&self, parameters: bool) -> Vec<u32> {
         let fixed = |v: Value| self.values.reads(v) == Reads::PARAMETERS;
         let chosen =
             self.pivot_guards.iter().enumerate().filter(|(_, w)| (fixed(w.pivot) && fixed(w.scale)) == parameters);
@@ -270,9 +276,11 @@ impl Program {
 struct Builder<'a> {
     program: &'a Program,
     preamble: bool,
-    /// Positions that are given.
-    positions: FxHashSet<Value>,
+    /// More values that stand before the routine runs.
+    given: FxHashSet<Value>,
     local: FxHashMap<Value, Local>,
+    /// Blocks that are solved so far.
+    solved: FxHashSet<BlockId>,
     code: Code,
     /// The Newton block that is open.
     inner: Inner,
@@ -300,14 +308,15 @@ enum Item {
 impl<'a> Builder<'a> {
     fn new(program: &'a Program, preamble: bool) -> Self {
         let (local, code, inner) = (FxHashMap::default(), Code::default(), Inner::default());
-        Builder { program, preamble, positions: FxHashSet::default(), local, code, inner }
+        let (given, solved) = (FxHashSet::default(), FxHashSet::default());
+        Builder { program, preamble, given, local, solved, code, inner }
     }
 
     fn build(mut self, wanted: &[Value], pivot_guards: &[u32]) -> Routine {
         let mut roots = wanted.to_vec();
         let guarded = |w: &u32| &self.program.pivot_guards[*w as usize];
         roots.extend(pivot_guards.iter().map(guarded).flat_map(|w| [w.pivot, w.scale]));
-        let live = self.program.dataflow().live_but_for(&roots, self.preamble, &self.positions);
+        let live = self.program.dataflow().live_but_for(&roots, self.preamble, &self.given);
         self.order(&live, pivot_guards).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
         debug_assert_eq!(self.code.verify(), Ok(()), "{}", self.program.name);
@@ -319,7 +328,7 @@ impl<'a> Builder<'a> {
         let op = self.program.values.op(v);
         match self.preamble {
             true => op.is_given() && !matches!(op, Op::Parameter(_)),
-            false => op.is_given() || self.program.values.reads(v) == Reads::PARAMETERS || self.positions.contains(&v),
+            false => op.is_given() || self.program.values.reads(v) == Reads::PARAMETERS || self.given.contains(&v),
         }
     }
 
@@ -450,7 +459,9 @@ impl<'a> Builder<'a> {
         let matrix = &program.blocks[block].matrix().values;
         let method = match &program.blocks[block] {
             Block::Linear { right, .. } => {
-                let (shared, right) = (program.factors_of(block), of(self, right));
+                // What was factored before the routine runs may have been factored otherwise since.
+                let shared = program.factors_of(block).filter(|lender| self.solved.contains(lender));
+                let right = of(self, right);
                 // Whoever shares no factors, or differentiates, forms a small matrix again.
                 let own = if shared.is_none() || matrix.size() <= SMALL { matrix.entries() } else { &[] };
                 Method::Linear { shared, matrix: of(self, own), right }
@@ -469,6 +480,7 @@ impl<'a> Builder<'a> {
             local
         });
         let unknowns = unknowns.collect();
+        self.solved.insert(block);
         let pattern = Arc::clone(matrix.pattern());
         self.code.steps.push(Step::Solve(Box::new(Solve { block, unknowns, pattern, method })));
     }

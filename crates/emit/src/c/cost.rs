@@ -52,6 +52,11 @@ impl OperationCount {
         work
     }
 
+    /// Operations of all kinds, without those of Newton blocks.
+    pub fn own(&self) -> u64 {
+        self.operations + self.divisions + self.calls
+    }
+
     fn count(&mut self, op: Op<Arg>) {
         match (op.cost(), op) {
             (_, Op::Call(Function::Sqrt, _)) | (program::Cost::Division, _) => self.divisions += 1,

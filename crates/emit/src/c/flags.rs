@@ -111,6 +111,16 @@ flags! {
     compares_rates
     /// They find a new Jacobian over several steps.
     finds_by_parts
+    /// Where a step ends it is found what the next one asks for,
+    looks_ahead
+    /// rates of positions among it,
+    moves_ahead
+    /// outputs,
+    shows_ahead
+    /// and it reads Newton blocks.
+    ahead_newton
+    /// Something that may jump with an input is looked at where one jumps.
+    inputs_jump
     time_passes
     /// Linear blocks with a constant matrix.
     linear_constant

@@ -387,6 +387,16 @@ fn of_steps(list: &mut List, plan: &Plan) {
             of_kept_steps(list, plan);
         }
     }
+    if let Some(ahead) = &plan.ahead {
+        list.arrays(Kind::Real, &["ahead"], ahead.size(), "what the next step asks for first");
+        list.one(Kind::Int, &["ahead_known"], "whether it is known, when and where it was found");
+        if plan.mode.is_some() {
+            list.one(Kind::Int, &["ahead_mode"], "");
+        }
+        list.one(Kind::Wide, &["ahead_t"], "");
+        list.arrays(Kind::Real, &["ahead_x"], plan.program.states.len(), "");
+        list.arrays(Kind::Real, &["ahead_u"], plan.program.inputs.len(), "");
+    }
 }
 
 /// What goes on from earlier steps.

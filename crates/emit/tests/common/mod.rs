@@ -186,12 +186,20 @@ impl Exported {
 
     /// The same run, taken from step to step.
     pub fn step(&self, steps: usize) -> (Rows, Option<String>) {
+        self.step_with(steps, |_, _| {})
+    }
+
+    /// The same where something is done before each step.
+    pub fn step_with(&self, steps: usize, before: impl Fn(&mut Model, usize)) -> (Rows, Option<String>) {
         let (mut model, mut x) = (self.model.clone(), self.start.clone());
         let mut run = Stepwise::new(self.fixed_method(), 0.0, &model).projecting(self.project);
         let mut values = vec![0.0; model.observed()];
         let mut rows = Vec::new();
         for i in 0..=steps {
             let t = tick(0.0, self.step, i as f64);
+            if i > 0 {
+                before(&mut model, i - 1);
+            }
             let done = if i == 0 { run.start(&mut model, &mut x) } else { run.advance(&mut model, t, &mut x) };
             if let Err(stopped) = done {
                 return (rows, Some(stopped.to_string()));

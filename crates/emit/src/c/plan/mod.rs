@@ -26,6 +26,7 @@ use super::write::{Moving, Place, Shape, TimeRate, Writer};
 use crate::EmitError;
 pub(super) use events::EventTables;
 pub(super) use modes::{ModeTables, Modes};
+pub(super) use routines::Ahead;
 use routines::{Routines, newton_of};
 use shapes::{ALONG, CLOCK, PLAIN, PREAMBLE, block_functions, of_parameters};
 pub(super) use step_order::StepOrder;
@@ -71,6 +72,8 @@ pub(super) struct Plan<'a> {
     pub(super) motion_blocks: Vec<BlockId>,
     /// How many of them, the first ones, rates read.
     motion_of_rates: usize,
+    /// What is found where a step ends, if that saves much.
+    pub ahead: Option<Ahead>,
     /// What the sizes of arrays in the model are.
     pub sizes: Sizes,
     passes: Vec<Pass>,
@@ -107,6 +110,8 @@ struct Works {
     solutions: OperationCount,
     observe: OperationCount,
     switching: OperationCount,
+    /// What is found where a step ends, and rates of that.
+    ahead: OperationCount,
     sources: OperationCount,
     returns: OperationCount,
     directional: OperationCount,
@@ -154,6 +159,7 @@ impl<'a> Plan<'a> {
             shown_blocks: Vec::new(),
             motion_blocks: Vec::new(),
             motion_of_rates: 0,
+            ahead: None,
             sizes: Sizes::default(),
             passes: Vec::new(),
             groups: Vec::new(),
@@ -172,7 +178,7 @@ impl<'a> Plan<'a> {
 
     fn write_functions(&mut self) {
         let program = self.program;
-        let routines = Routines::of(self);
+        let routines = Routines::of(self).with_ahead(self);
         let blocks = routines.newton();
         let used: Vec<BlockId> = blocks.keys().copied().collect();
         let patterns = Rc::clone(&self.patterns);
@@ -202,6 +208,13 @@ impl<'a> Plan<'a> {
         functions.extend(plain(&mut writer, "ha_motion_code", &routines.motion));
         functions.extend(plain(&mut writer, "ha_shown_motion_code", &routines.shown_motion));
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
+        if let Some((ahead, [found, rest])) = &routines.ahead {
+            functions.extend(plain(&mut writer, "ha_ahead_code", found));
+            writer.givens.ahead = ahead.places().collect();
+            functions.extend(plain(&mut writer, "ha_rates_ahead_code", rest));
+            writer.givens.ahead.clear();
+            self.ahead = Some(ahead.clone());
+        }
         functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));
         functions.extend(plain(&mut writer, "ha_becomes_code", &routines.becomes));
         for (i, clause) in routines.clauses.iter().enumerate() {
@@ -276,6 +289,10 @@ impl<'a> Plan<'a> {
             observe: work(&routines.observe),
             solutions: work(&routines.solutions),
             switching: work(&routines.switching),
+            ahead: routines
+                .ahead
+                .as_ref()
+                .map_or_else(OperationCount::default, |(_, [found, rest])| work(found) + work(rest)),
             sources: work(&routines.sources),
             returns: work(&routines.returns).along(),
             directional: work(&routines.rates).along(),

@@ -2,9 +2,44 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow_compiler::program::{Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, Routine, Solve, Value};
+use halfarrow_compiler::program::{
+    Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, RatesAhead, Routine, Solve, Value,
+};
 
 use super::{ModeTables, Plan};
+use crate::Real;
+use crate::c::cost::OperationCount;
+
+/// Operations that are to be saved at each step where code is written twice for it.
+const LEAST_SAVED: u64 = 300;
+
+/// What is found where a step ends, one after the other: operands of conditions and rates of positions, outputs, and what
+/// rates read that no input moves.
+#[derive(Debug, Clone)]
+pub(in crate::c) struct Ahead {
+    /// How many of the first, and of outputs: all or none.
+    seen: usize,
+    pub shown: usize,
+    known: Vec<Value>,
+    /// Newton blocks that it reads.
+    pub blocks: Vec<BlockId>,
+}
+
+impl Ahead {
+    pub fn size(&self) -> usize {
+        self.seen + self.shown + self.known.len()
+    }
+
+    /// The place of the first output.
+    pub fn shown_from(&self) -> usize {
+        self.seen
+    }
+
+    /// Where what rates read stands.
+    pub fn places(&self) -> impl Iterator<Item = (Value, usize)> + '_ {
+        self.known.iter().copied().zip(self.seen + self.shown..)
+    }
+}
 
 /// What the functions compute.
 pub(super) struct Routines {
@@ -40,6 +75,8 @@ pub(super) struct Routines {
     pub pivots: Routine,
     /// Relations onto which positions are put back.
     pub relations: Routine,
+    /// What is asked for where a step ends and the next one begins, and rates of that.
+    pub ahead: Option<(Ahead, [Routine; 2])>,
     /// What the start of a run asks for, each with the name of its function.
     pub starts: Vec<(String, Routine)>,
 }
@@ -99,8 +136,34 @@ impl Routines {
             sources: p.routine(&p.held.iter().map(|h| h.source).collect::<Vec<_>>()),
             domains: p.routine(&p.domains.iter().map(|d| d.argument).collect::<Vec<_>>()),
             relations: plan.relations_routine(),
+            ahead: None,
             starts: passes.chain(groups).chain(guesses).map(start).collect(),
         }
+    }
+
+    /// What a step asks for at its end and the next one first, in one go where that saves much: the code is written once more.
+    #[must_use]
+    pub fn with_ahead(mut self, plan: &Plan) -> Routines {
+        let p = plan.program;
+        if plan.export.real == Real::Float || !(plan.delays.is_empty() && plan.samples.is_empty()) {
+            return self;
+        }
+        let own = |block: BlockId| !newton_of(&self.rates.code).any(|solve| solve.block == block);
+        let shown = !newton_of(&self.observe.code).any(|solve| own(solve.block));
+        let shown = if shown { &self.observe.wanted[..] } else { &[] };
+        let RatesAhead { known, rest } = p.rates_ahead();
+        let [operands, motions] = [&self.switching, &self.motion].map(|routine| &routine.wanted[..]);
+        let ahead = p.guarded_routine(&[operands, motions, shown, &known].concat());
+        let work = |routine: &Routine| OperationCount::of(p, &routine.code).own();
+        let alone = [&self.rates, &self.switching, &self.motion]
+            .into_iter()
+            .chain((!shown.is_empty()).then_some(&self.observe));
+        if alone.map(work).sum::<u64>() >= work(&ahead) + work(&rest) + LEAST_SAVED {
+            let blocks = newton_of(&ahead.code).map(|solve| solve.block).collect();
+            let (seen, shown) = (operands.len() + motions.len(), shown.len());
+            self.ahead = Some((Ahead { seen, shown, known, blocks }, [ahead, rest]));
+        }
+        self
     }
 
     fn all(&self) -> impl Iterator<Item = &Routine> {

@@ -9,7 +9,7 @@ use super::super::patterns::FULL_AT_MOST;
 use super::super::start::Group;
 use super::super::template::Words;
 use super::super::written::{Needed, Notes, Part, Written, written};
-use super::Plan;
+use super::{Ahead, Plan};
 use crate::{Method, Real};
 
 impl Plan<'_> {
@@ -92,6 +92,10 @@ impl Plan<'_> {
             ("GROUP_STARTS", lines(lengths(&groups))),
             ("GROUP_COLUMNS", lines(flat(&groups))),
             ("GROUPS", groups.len().to_string()),
+            ("AHEAD", self.ahead.as_ref().map_or(0, Ahead::size).to_string()),
+            ("AHEAD_SHOWN", self.ahead.as_ref().map_or(0, Ahead::shown_from).to_string()),
+            ("AHEAD_BLOCKS", join(block_numbers(self.ahead.as_ref().map_or(&[][..], |ahead| &ahead.blocks)))),
+            ("AHEAD_BLOCK_COUNT", self.ahead.as_ref().map_or(0, |ahead| ahead.blocks.len()).to_string()),
             ("GROUPS_A_STEP", self.groups_a_step().unwrap_or(groups.len()).to_string()),
             ("NONZEROS", columns.iter().map(Vec::len).sum::<usize>().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),

@@ -89,7 +89,16 @@ static int ha_note_motion(ha_model *m, double t, const $real *x, ha_code code, i
         m->motion_passed[blocks[b]] = t - m->motion_time[blocks[b]];
         m->motion_time[blocks[b]] = t;
     }
+    status = $MODEL_OK;
+//if moves_ahead
+    if (first == 0 && $ha_is_found_ahead(m, t, x)) {
+        $ha_copy(m->moves, m->ahead + $SWITCHES, count);
+    } else {
+        status = $ha_run(m, code, t, x, m->moves, count);
+    }
+//else
     status = $ha_run(m, code, t, x, m->moves, count);
+//end
     if (status != $MODEL_OK) {
         return status;
     }
@@ -175,6 +184,11 @@ static int ha_follow_solutions(ha_model *m, double t, const $real *x)
         }
         for (i = 0; i < $RATES_BLOCK_COUNT; ++i) {
             $ha_newton_accept(m, blocks[i]);
+//if looks_ahead
+            if (!m->fresh[blocks[i]]) {
+                $ha_forget_ahead(m);
+            }
+//end
         }
 //if rates_motion
         status = $ha_note_motion(m, t, x, $ha_motion_code, 0, $MOTION_OF_RATES, $MOTION_COUNT);

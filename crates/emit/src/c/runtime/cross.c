@@ -24,6 +24,9 @@ static int ha_cross_begin(ha_model *m, double t, $real *x)
     }
 //end
     m->crossed = t;
+//if looks_ahead
+    $ha_forget_ahead(m);
+//end
     $ha_copy(m->u_crossed, m->u, HA_NU);
 //if switches
     m->state_hold = HA_FOLLOW;

@@ -25,6 +25,17 @@ static int ha_all_finite(const $real *a, int n)
     return rest[0] + rest[1] + rest[2] + rest[3] == $0.0;
 }
 
+//if looks_ahead
+//item ha_are_equal
+static int ha_are_equal(const $real *a, const $real *b, int n)
+{
+    int i;
+    for (i = 0; i < n && a[i] == b[i]; ++i) {
+    }
+    return i == n;
+}
+
+//end
 //item ha_copy
 static void ha_copy($real *to, const $real *from, int n)
 {

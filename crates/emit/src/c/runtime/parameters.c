@@ -19,6 +19,9 @@ static int ha_parameters(ha_model *m)
 {
     int status;
     int i;
+//if looks_ahead
+    $ha_forget_ahead(m);
+//end
 //if linear_constant
     for (i = 0; i < $FACTORED; ++i) {
         m->factored[i] = 0;

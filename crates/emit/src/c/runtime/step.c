@@ -75,6 +75,11 @@ static int ha_reach(ha_model *m, double *end)
         m->failure = failure;
     }
 //end
+//if looks_ahead
+    if (status == $MODEL_OK) {
+        $ha_find_ahead(m, *end, m->trial);
+    }
+//end
     return status;
 }
 
@@ -439,9 +444,11 @@ int $model_step_until($model *m, double end)
         if (!$ha_finite(m->u[i])) {
             return $ha_fail(m, $MODEL_INPUT_NOT_FINITE, i, m->t);
         }
+//if inputs_jump
         if (m->u[i] != m->u_crossed[i]) {
             m->cross_due = 1;
         }
+//end
     }
     if (m->cross_due) {
         status = $model_cross(m, m->t, m->x);

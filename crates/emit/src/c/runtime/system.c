@@ -68,6 +68,72 @@ static int ha_run(ha_model *m, ha_code code, double t, const $real *x, $real *ou
     return status;
 }
 
+//if looks_ahead
+//item ha_is_known_ahead
+/* Whether what is asked for at (t, x) has been found where a step ended there, but for what inputs move. */
+static int ha_is_known_ahead(const ha_model *m, double t, const $real *x)
+{
+//if modes
+    if (m->ahead_mode != m->mode) {
+        return 0;
+    }
+//end
+    return m->ahead_known && t == m->ahead_t && $ha_are_equal(x, m->ahead_x, HA_NX);
+}
+
+//item ha_is_found_ahead
+/* The same with the present inputs. */
+static int ha_is_found_ahead(const ha_model *m, double t, const $real *x)
+{
+    return $ha_is_known_ahead(m, t, x) && $ha_are_equal(m->u, m->ahead_u, HA_NU);
+}
+
+//item ha_forget_ahead
+static void ha_forget_ahead(ha_model *m)
+{
+    m->ahead_known = 0;
+}
+
+//item ha_find_ahead
+/* Where a step ends: operands of conditions, rates of positions and outputs, which are asked for next, and what the rates read that no
+ * input moves, in one go, since they have most of it in common. */
+static void ha_find_ahead(ha_model *m, double t, const $real *x)
+{
+    int status;
+    int i;
+    m->ahead_known = 0;
+//if assumptions
+    if (m->broken) {
+        return;
+    }
+//end
+    status = $ha_ahead_code(m, t, x, m->ahead);
+    if (status != $MODEL_OK || !$ha_all_finite(m->ahead, $AHEAD)) {
+        m->failure.code = $MODEL_OK;
+        return;
+    }
+//if ahead_newton
+    {
+        /* Solutions that are refined when they are asked for again were others. */
+        static const int blocks[] = {$AHEAD_BLOCKS};
+        for (i = 0; i < $AHEAD_BLOCK_COUNT; ++i) {
+            if (!m->fresh[blocks[i]]) {
+                return;
+            }
+        }
+    }
+//end
+    (void)i;
+    $ha_copy(m->ahead_x, x, HA_NX);
+    $ha_copy(m->ahead_u, m->u, HA_NU);
+//if modes
+    m->ahead_mode = m->mode;
+//end
+    m->ahead_t = t;
+    m->ahead_known = 1;
+}
+
+//end
 //if domains
 //item ha_explain
 /* The failure behind a value that is not a number: the first law without a value, if there is one. */
@@ -91,8 +157,17 @@ static int ha_explain(ha_model *m, double t, const $real *x, int code, int where
 //public $model_rates
 int $model_rates($model *m, double t, const $real *x, $real *dx)
 {
-    const int status = $ha_run(m, $ha_rates_code, t, x, dx, HA_NX);
+    int status;
     int i;
+//if looks_ahead
+    if ($ha_is_known_ahead(m, t, x)) {
+        if ($ha_rates_ahead_code(m, t, x, dx) == $MODEL_OK && $ha_all_finite(dx, HA_NX)) {
+            return $MODEL_OK;
+        }
+        m->failure.code = $MODEL_OK;
+    }
+//end
+    status = $ha_run(m, $ha_rates_code, t, x, dx, HA_NX);
     if (status != $MODEL_OK) {
         return status;
     }
@@ -112,9 +187,16 @@ int $model_rates($model *m, double t, const $real *x, $real *dx)
 int $model_observe($model *m, double t, const $real *x, $real *y)
 {
 //if outputs
-    const int status = $ha_run(m, $ha_observe_code, t, x, y, HA_NY);
+    int status;
     int infinite = -1;
     int i;
+//if shows_ahead
+    if ($ha_is_found_ahead(m, t, x)) {
+        $ha_copy(y, m->ahead + $AHEAD_SHOWN, HA_NY);
+        return $MODEL_OK;
+    }
+//end
+    status = $ha_run(m, $ha_observe_code, t, x, y, HA_NY);
     if (status != $MODEL_OK) {
         return status;
     }
@@ -322,7 +404,16 @@ static void ha_indicators_of_operands(ha_model *m, double t, $real *g)
 //public $model_indicators
 int $model_indicators($model *m, double t, const $real *x, $real *g)
 {
-    const int status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
+    int status = $MODEL_OK;
+//if looks_ahead
+    if ($ha_is_found_ahead(m, t, x)) {
+        $ha_copy(m->operands, m->ahead, $SWITCHES);
+    } else {
+        status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
+    }
+//else
+    status = $ha_run(m, $ha_switching_code, t, x, m->operands, $SWITCHES);
+//end
     if (status == $MODEL_OK) {
         $ha_indicators_of_operands(m, t, g);
     }
