@@ -7,7 +7,7 @@ use halfarrow_compiler::algebra::{Expr, Exprs, Symbol};
 use halfarrow_compiler::bond_graph::{Meaning, NoFiles};
 use halfarrow_compiler::compile::{Text, to_equations};
 use halfarrow_compiler::equations::{EquationStep, Equations, Form, LinearBlock, NewtonBlock};
-use halfarrow_compiler::textbook::{Shown, Style, print, print_dependent, print_meanings, show};
+use halfarrow_compiler::textbook::{Shown, Style, only, print, print_dependent, print_meanings, show};
 
 fn models() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
@@ -193,6 +193,31 @@ fn fractions_stand_over_one_denominator() {
     let parallel =
         "model P\nparam R1 = 2, R2 = 3, m = 1\nSf:s(1) -> 0:n -> R:R1(R1)\nn -> R:R2(R2)\nn -> 1:b -> I:I(m)\n";
     assert_eq!(text(parallel), ["m f_I' = R1 R2 (1 - f_I)/(R1 + R2)"]);
+}
+
+#[test]
+fn strands_that_are_alike_are_one_equation_of_vectors() {
+    let ball = |mass: &str, rest: &str| {
+        format!(
+            "model Ball\nparam b = 0.3\n1[3]:v -> I[3]:m({mass}, f0 = [10, 0, 12])\nv -> R[3]:drag(b)\n\
+             Se[3]:gravity([0, 0, -19.62]) -> v\nv -> C[3]:rope(k = 5)\n{rest}"
+        )
+    };
+    let whole = ["2 f_m' = -b f_m - 5 q_rope + [0, 0, -19.62]", "q_rope' = f_m"];
+    let alike = shown_of(&ball("2", ""));
+    assert_eq!(print(&alike, Style::Unicode), whole);
+    // Programs are given an equation for each state.
+    assert_eq!(print(&alike, Style::Ascii).len(), 6);
+    assert!(print(&alike, Style::Latex).iter().all(|line| well_set(line)));
+    assert_eq!(print(&only(alike, &[]), Style::Unicode), [""; 0]);
+    // Another mass in one strand, and another force.
+    let text_of = |mass: &str, rest: &str| text(&ball(mass, rest));
+    assert_eq!(text_of("diag([2, 2, 3])", "")[2..], ["3 f_m.z' = -b f_m.z - 5 q_rope.z - 19.62", whole[1]]);
+    let pushed = "input push = 0\nSe:wind(push) -> v.x\n";
+    assert_eq!(text_of("2", pushed)[0], "2 f_m' = -b f_m - 5 q_rope + [push, 0, -19.62]");
+    // What reads another strand, or a strand otherwise than in proportion, is no vector.
+    let across = "v.x -> R:one(e = 2*f*abs(f))\n";
+    assert_eq!(text_of("2", across).len(), 4);
 }
 
 /// The unknowns of a page: what it names that is neither given, nor a state, nor defined on it.

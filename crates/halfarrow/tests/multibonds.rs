@@ -32,6 +32,19 @@ fn close(found: f64, expected: f64, off: f64) {
     assert!((found - expected).abs() <= off, "{found} instead of {expected}: off by {:.1e}", (found - expected).abs());
 }
 
+#[test]
+fn what_stands_often_in_equations_has_a_name() {
+    let turning = "model Turning\nimport std.multibody\n\
+        World:world -> Free:joint() -> Body:body(m = 2, J = diag([0.1, 0.2, 0.3]))\n";
+    let report = model(turning).equations(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let lines = [report.text, report.legend].concat();
+    let norms = |line: &String| line.matches("joint.turning.e[1]² + joint.turning.u[1]²").count();
+    assert_eq!(lines.iter().map(norms).sum::<usize>(), 1, "{lines:#?}");
+    // No pull of the earth along x and y.
+    assert!(lines.iter().all(|line| !line.contains(" 0 ")), "{lines:#?}");
+    assert!(lines[..3].iter().all(|line| line.chars().count() < 80), "{lines:#?}");
+}
+
 /// Names and number of the states of the minimal form.
 fn states(text: &str) -> Vec<String> {
     let report = model(text).equations(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));

@@ -7,6 +7,9 @@ use std::collections::BTreeMap;
 
 /// Parts that are shorter than this in print get no name: `sin(a - b)`.
 const SHORTEST: u64 = 12;
+/// But for those that stand so often, and are no shorter than this: `a^2 + b^2 + c^2`.
+const OFTEN: u64 = 6;
+const SHORTEST_OFTEN: u64 = 8;
 /// What names have to save in print, that of their definition taken off.
 const SAVED: u64 = 20;
 
@@ -59,7 +62,9 @@ impl Exprs {
                 Some(&known) => known,
                 None => {
                     let unit = number.recip().map_or(rebuilt, |inverse| self.scale(&inverse, rebuilt));
-                    let shown = short(self, unit);
+                    // What is kept whole stands in print as its part.
+                    let part = if let Node::Whole(part) = *self.node(unit) { part } else { unit };
+                    let shown = short(self, part);
                     let value = if self.saves(shown, times) {
                         let symbol = name(self);
                         definitions.push((symbol, shown));
@@ -101,15 +106,17 @@ impl Exprs {
         }
     }
 
-    /// Sums, products and functions may; of powers their bases.
+    /// Sums, products and functions may, and what is kept whole; of powers their bases.
     fn may_have_name(&self, e: Expr) -> bool {
-        let compound = matches!(self.node(e), Node::Add(_) | Node::Mul(_) | Node::Pow(..) | Node::Call(..));
+        use Node::{Add, Call, Mul, Pow, Whole};
+        let compound = matches!(self.node(e), Add(_) | Mul(_) | Pow(..) | Call(..) | Whole(_));
         compound && self.base_of_power(e).is_none()
     }
 
     /// Whether a name for what stands so often saves print.
     fn saves(&self, e: Expr, times: u32) -> bool {
         let (length, times) = (self.printed_length(e), u64::from(times));
-        length >= SHORTEST && (times - 1).saturating_mul(length) > 2 * times + 3 + SAVED
+        let shortest = if times >= OFTEN { SHORTEST_OFTEN } else { SHORTEST };
+        length >= shortest && (times - 1).saturating_mul(length) > 2 * times + 3 + SAVED
     }
 }

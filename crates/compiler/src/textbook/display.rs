@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::named::{named_page, wide_blocks};
+use super::vectors::{Strands, Vectors, vectors};
 use crate::algebra::{Expr, Exprs, Node, Symbol};
 use crate::bond_graph::{BondGraph, Named};
 use crate::equations::{
@@ -25,6 +26,8 @@ pub struct Shown {
     pub equations: Equations,
     /// One equation for each state, then what stays implicit.
     pub display: Vec<DisplayEquation>,
+    /// Equations of these that are alike for the strands of a multibond, as people write them.
+    pub vectors: Vectors,
     /// Each dependent storage with its co-energy variable as a combination of independent ones: its row of `S`.
     pub dependent: Vec<Dependent>,
     /// Sources, and states with a constant, that stand in `display` by name, with their values.
@@ -85,7 +88,18 @@ pub fn show(mut equations: Equations) -> Shown {
     equations.graph.exprs = x;
     equations.definitions = of;
     Ordered { steps: equations.steps, rows: equations.rows, .. } = ordered;
-    Shown { equations, display, dependent, sources, aliases, definitions }
+    let vectors = Vectors::default();
+    Shown { equations, display, vectors, dependent, sources, aliases, definitions }.with_vectors()
+}
+
+impl Shown {
+    /// The same with the vectors of these equations.
+    pub(super) fn with_vectors(mut self) -> Shown {
+        let equations = &mut self.equations;
+        let strands = Strands::of(&equations.graph, &equations.states, &self.sources);
+        self.vectors = vectors(&mut equations.graph.exprs, &strands, &self.display);
+        self
+    }
 }
 
 /// What is printed; see [`Shown`].
@@ -400,5 +414,6 @@ pub fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> E
 
 pub fn textbook(x: &mut Exprs, e: Expr) -> Expr {
     let e = x.textbook(e);
-    x.without_settled_terms(e)
+    let e = x.without_settled_terms(e);
+    x.without_idle_terms(e)
 }

@@ -6,6 +6,7 @@ mod named;
 mod only;
 mod places;
 mod text;
+mod vectors;
 
 pub use display::{Dependent, DisplayEquation, Shown, ShownDefinition, show};
 pub use only::only;
@@ -14,3 +15,4 @@ pub use text::{
     print_dependent, print_events, print_expr, print_expr_within, print_form, print_meanings, print_symbol,
     print_within, sides_within,
 };
+pub use vectors::{VectorEquation, Vectors};

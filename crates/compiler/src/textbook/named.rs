@@ -42,6 +42,8 @@ pub fn named_page(d: &mut Definitions, equations: &Equations, ordered: &Ordered)
     let mut display = open_rows.shown(&mut d.x, roots, share);
     let mut dependent = open_rows.dependent(&mut d.x, roots, share);
     put_in_what_stands_once(d, &mut display, &mut dependent, &mut all);
+    let unknown: BTreeSet<Symbol> = open_rows.rows.iter().flat_map(|row| row.symbols.iter().copied()).collect();
+    name_what_is_shared(d, &unknown, (&mut display, &mut dependent, &mut all), &mut names);
     page(d, display, dependent, all, named, aliases)
 }
 
@@ -86,7 +88,8 @@ fn with_definitions(d: &Definitions, mut read: BTreeSet<Symbol>, all: &[(Symbol,
 /// An expression in a short form, within a bound of work.
 fn shortened(x: &mut Exprs, e: Expr, work: u64) -> Expr {
     if x.printed_length(e) > SEARCHED {
-        return x.without_settled_terms(e);
+        let e = x.without_settled_terms(e);
+        return x.without_idle_terms(e);
     }
     x.bound_search(work);
     put_in_shown(x, e, &BTreeMap::new())
@@ -392,6 +395,27 @@ fn put_in_what_stands_once(
         equation.right = d.x.substitute(equation.right, &known);
     }
     dependent.iter_mut().for_each(|row| row.value = d.x.substitute(row.value, &known));
+}
+
+/// Short forms have parts in common that had none before.
+fn name_what_is_shared(
+    d: &mut Definitions,
+    unknown: &BTreeSet<Symbol>,
+    (display, dependent, all): (&mut [DisplayEquation], &mut [Dependent], &mut Vec<(Symbol, Expr)>),
+    names: &mut FreshNames,
+) {
+    let mut sides: Vec<&mut Expr> = Vec::new();
+    display.iter_mut().for_each(|e| sides.extend([&mut e.left, &mut e.right]));
+    sides.extend(dependent.iter_mut().map(|row| &mut row.value));
+    sides.extend(all.iter_mut().map(|definition| &mut definition.1));
+    let exprs: Vec<Expr> = sides.iter().map(|side| **side).collect();
+    let Shared { roots, definitions } = d.x.share(&exprs, &mut |x| names.next(x), &mut |_, e| e);
+    // An unknown stands in its equation, not in a part of it.
+    if definitions.iter().any(|(_, value)| d.x.symbols_of(*value).iter().any(|s| unknown.contains(s))) {
+        return;
+    }
+    sides.into_iter().zip(roots).for_each(|(side, root)| *side = root);
+    *all = in_order(d, definitions, std::mem::take(all));
 }
 
 /// Names that nothing in the model has: `s1`, `s2`, ...

@@ -38,7 +38,7 @@ pub fn only(mut shown: Shown, asked: &[Symbol]) -> Shown {
     shown.definitions.retain(|d| read.contains(&d.symbol));
     shown.definitions.iter_mut().for_each(|d| d.of_dependent = false);
     shown.definitions.extend(added);
-    shown
+    shown.with_vectors()
 }
 
 fn definition(symbol: Symbol, value: Expr) -> ShownDefinition {

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
-use super::{Dependent, DisplayEquation, Shown, ShownDefinition, places};
+use super::{Dependent, DisplayEquation, Shown, ShownDefinition, VectorEquation, places};
 use crate::algebra::{
     Expr, Exprs, Names, Place, Sort, Symbol, ascii, ascii_within, dotted, latex, latex_name, latex_owner, mathml_name,
     mathml_owner, mathml_within, unicode_name, unicode_within,
@@ -43,9 +43,47 @@ pub fn print_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<I
 /// The same, left and right sides apart.
 pub fn sides_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<Item = (String, String)> {
     let names = Written::within(shown, most);
-    let sides = move |d: &DisplayEquation| if style == Style::Ascii { d.closed } else { (d.left, d.right) };
-    let side = move |e: Expr| expression(e, &names, style);
-    shown.display.iter().map(sides).map(move |(left, right)| (side(left), side(right)))
+    lines(shown, style).map(move |line| {
+        let side = |e: Expr| expression(e, &names, style);
+        match line {
+            Line::Row(row) if style == Style::Ascii => (side(row.closed.0), side(row.closed.1)),
+            Line::Row(row) => (side(row.left), side(row.right)),
+            Line::Vector(row) => {
+                let added: Vec<String> = row.added.iter().map(|&e| side(e)).collect();
+                (side(row.left), side(row.right) + &plus_vector(&added, style))
+            }
+        }
+    })
+}
+
+/// What stands on a line.
+enum Line<'a> {
+    Row(&'a DisplayEquation),
+    Vector(&'a VectorEquation),
+}
+
+/// The equations, for people with one of vectors where those of strands are alike.
+fn lines(shown: &Shown, style: Style) -> impl Iterator<Item = Line<'_>> {
+    let vectors = if style == Style::Ascii { &[][..] } else { &shown.vectors.equations };
+    let (mut at, mut next) = (0, vectors.iter().peekable());
+    std::iter::from_fn(move || {
+        if let Some(vector) = next.next_if(|vector| vector.rows.start == at) {
+            at = vector.rows.end;
+            return Some(Line::Vector(vector));
+        }
+        at += 1;
+        shown.display.get(at - 1).map(Line::Row)
+    })
+}
+
+/// A vector that is added, by what stands in its strands.
+fn plus_vector(strands: &[String], style: Style) -> String {
+    match style {
+        _ if strands.is_empty() => String::new(),
+        Style::Ascii | Style::Unicode => format!(" + [{}]", strands.join(", ")),
+        Style::Latex => format!(" + \\begin{{bmatrix}} {} \\end{{bmatrix}}", strands.join(" \\\\ ")),
+        Style::MathMl => format!("<mo>+</mo><mo>[</mo>{}<mo>]</mo>", strands.join("<mo>,</mo>")),
+    }
 }
 
 /// What stands behind the names, one at a time; see [`print_meanings`] and [`print_within`].
@@ -284,6 +322,9 @@ impl<'a> Written<'a> {
             states.insert(state.symbol, (state.name.as_str(), false));
             states.insert(state.rate, (state.name.as_str(), true));
         }
+        for (&symbol, (name, rates)) in &shown.vectors.names {
+            states.insert(symbol, (name.as_str(), *rates > 0));
+        }
         let rate_of = equations.states.iter().map(|s| (s.rate, s.symbol)).collect();
         let sources = shown.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();
         let places = places::of(shown);
@@ -348,7 +389,7 @@ impl Names for Written<'_> {
 }
 
 /// The name of the source that sets a variable.
-fn element_name(graph: &BondGraph, symbol: Symbol) -> String {
+pub(super) fn element_name(graph: &BondGraph, symbol: Symbol) -> String {
     let bond = match graph.variables.get(&symbol).map(|v| v.meaning) {
         Some(Meaning::Effort(bond) | Meaning::Flow(bond)) => &graph.bonds[bond],
         _ => return graph.exprs.name(symbol).to_string(),

@@ -11,6 +11,7 @@ mod trigonometric;
 use super::exprs::Exprs;
 use super::node::{Expr, Node};
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeSet;
 
 /// Expressions that are longer than this are left as they are; their parts are not.
 const LONGEST: u64 = 600;
@@ -190,6 +191,18 @@ impl Exprs {
 
     /// Without terms `0 f` in which `f` reads parameters only and has a value at the given ones.
     pub fn without_settled_terms(&mut self, e: Expr) -> Expr {
+        self.without_zero_terms(e, &|x, f| x.given_value(f).is_some_and(f64::is_finite))
+    }
+
+    /// Without terms `0 f` in which `f` has a value wherever what is left has one.
+    pub fn without_idle_terms(&mut self, e: Expr) -> Expr {
+        let left = self.without_zero_terms(e, &|_, _| true);
+        let needs = self.needs(left);
+        self.without_zero_terms(e, &|x, f| x.needs(f).is_subset(&needs))
+    }
+
+    /// Without those terms `0 f` whose `f` may go.
+    fn without_zero_terms(&mut self, e: Expr, may_go: &dyn Fn(&Exprs, Expr) -> bool) -> Expr {
         let order = self.below(&[e], &|_| true);
         let vanishes = |x: &Exprs, e: Expr| matches!(x.node(e), Node::Mul(_)) && x.coefficient(e).0.is_zero();
         if !order.iter().any(|&part| vanishes(self, part)) {
@@ -197,12 +210,24 @@ impl Exprs {
         }
         let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
         for part in order {
-            let rest = self.coefficient(part).1;
-            let settled = vanishes(self, part) && self.given_value(rest).is_some_and(f64::is_finite);
-            let value = if settled { super::ZERO } else { self.rebuild(part, &|c| new[&c]) };
+            let goes = vanishes(self, part) && may_go(self, self.coefficient(part).1);
+            let value = if goes { super::ZERO } else { self.rebuild(part, &|c| new[&c]) };
             new.insert(part, value);
         }
         new[&e]
+    }
+
+    /// What an expression needs to have a value: what is divided by, and other parts that have none everywhere.
+    fn needs(&self, e: Expr) -> BTreeSet<Expr> {
+        let need = |&part: &Expr| match *self.node(part) {
+            Node::Pow(base, n) if self.is_number(n).is_some_and(|n| n.is_integer()) => {
+                (!self.total(part)).then_some(base)
+            }
+            _ => (!self.total(part)).then_some(part),
+        };
+        // A sum or product has a value where its parts do.
+        let own = |part: &Expr| !matches!(self.node(*part), Node::Add(_) | Node::Mul(_));
+        self.below(&[e], &|_| true).iter().filter(|part| own(part)).filter_map(need).collect()
     }
 
     /// Bounds the search for short forms from now on: after so many terms have been formed, what [`Exprs::simplify`]

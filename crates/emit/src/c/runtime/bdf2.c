@@ -123,13 +123,17 @@ static int ha_change_along(ha_model *m, double t, $real h, const $real *x)
         m->failure.code = $MODEL_OK;
         return 2;
     }
+    /* Beside what moves a state, where that is another one by a part of all that pushes and pulls. */
+    $ha_fill(m->point, $0.0, HA_NX);
     for (column = 0; column < HA_NX; ++column) {
         for (j = $ha_column_starts[column]; j < $ha_column_starts[column + 1]; ++j) {
             const $real term = m->jacobian[j] * m->way[column];
             m->product[$ha_column_rows[j]] -= term;
+            m->point[$ha_column_rows[j]] += $fabs(term);
         }
     }
     for (i = 0; i < HA_NX; ++i) {
+        m->point[i] = $fabs(m->product[i]) > $0.1 * m->point[i] ? $1.0 : $0.0;
         m->product[i] *= m->jacobian_scale;
     }
     $ha_matrix_solve(m, m->product);
@@ -143,7 +147,7 @@ static int ha_change_along(ha_model *m, double t, $real h, const $real *x)
         if (other <= $0.2 * $ha_max($fabs(m->way[i]), $1e-4 * size)) {
             continue;
         }
-        if (!(other <= $0.1 * size)) {
+        if (!$ha_finite(other) || (other > $0.1 * size && m->point[i] != $0.0)) {
             return 2;
         }
         change = 1;
@@ -175,6 +179,16 @@ static void ha_find_all(ha_model *m, double t, $real h, const $real *x)
 }
 
 //if finds_by_parts
+//item ha_want_next
+/* From now on a Jacobian at this state is found, unless one is. */
+static void ha_want_next(ha_model *m, const $real *x)
+{
+    if (!m->next_groups) {
+        m->next_groups = $GROUPS;
+        $ha_copy(m->next_at, x, HA_NX);
+    }
+}
+
 //item ha_find_some
 /* Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole. */
 static void ha_find_some(ha_model *m, double t, $real h)
@@ -223,9 +237,8 @@ static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on
         const int change = $ha_change_along(m, t, h, x);
         m->jacobian_steps = 0;
 //if finds_by_parts
-        if (change == 1 && !follows) {
-            m->next_groups = $GROUPS;
-            $ha_copy(m->next_at, x, HA_NX);
+        if (change == 1) {
+            $ha_want_next(m, x);
         }
         if (change == 2) {
 //else
@@ -359,17 +372,28 @@ static int ha_solve_step(ha_model *m, double t, $real h, const $real *x)
     int i;
     if (m->before_counts && $ha_ends_at(m->before_end, m->before_length, t) && ratio <= $20.0) {
         const int status = $ha_solve_on(m, t, h, ratio, x);
+        int change;
         if (status != $MODEL_OK) {
             return status;
         }
-        if (!($ha_is_doubtful(m, x) && $ha_change_along(m, t, h, x))) {
-            for (i = 0; i < HA_NX; ++i) {
-                m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
-            }
-            return $MODEL_OK;
+        change = $ha_is_doubtful(m, x) ? $ha_change_along(m, t, h, x) : 0;
+//if finds_by_parts
+        if (change == 2) {
+//else
+        if (change) {
+//end
+            $ha_find_all(m, t, h, x);
+            return $ha_begin(m, t, h, 1, x);
         }
-        $ha_find_all(m, t, h, x);
-        return $ha_begin(m, t, h, 1, x);
+//if finds_by_parts
+        if (change) {
+            $ha_want_next(m, x);
+        }
+//end
+        for (i = 0; i < HA_NX; ++i) {
+            m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
+        }
+        return $MODEL_OK;
     }
     return $ha_begin(m, t, h, 2, x);
 }
