@@ -215,6 +215,8 @@ fn strands_that_are_alike_are_one_equation_of_vectors() {
     assert_eq!(text_of("diag([2, 2, 3])", "")[2..], ["3 f_m.z' = -b f_m.z - 5 q_rope.z - 19.62", whole[1]]);
     let pushed = "input push = 0\nSe:wind(push) -> v.x\n";
     assert_eq!(text_of("2", pushed)[0], "2 f_m' = -b f_m - 5 q_rope + [push, 0, -19.62]");
+    // What has a name of its own keeps it.
+    assert_eq!(text_of("2", "output vx = v.x.f : m/s\n")[3], "q_rope.x' = vx");
     // What reads another strand, or a strand otherwise than in proportion, is no vector.
     let across = "v.x -> R:one(e = 2*f*abs(f))\n";
     assert_eq!(text_of("2", across).len(), 4);

@@ -96,7 +96,7 @@ impl Shown {
     /// The same with the vectors of these equations.
     pub(super) fn with_vectors(mut self) -> Shown {
         let equations = &mut self.equations;
-        let strands = Strands::of(&equations.graph, &equations.states, &self.sources);
+        let strands = Strands::of(&equations.graph, &equations.states, &self.sources, &self.aliases);
         self.vectors = vectors(&mut equations.graph.exprs, &strands, &self.display);
         self
     }

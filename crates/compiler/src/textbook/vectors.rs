@@ -89,8 +89,13 @@ pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) ->
 pub struct Strands(BTreeMap<Symbol, Strand>);
 
 impl Strands {
-    /// Those of states, of their rates, and of sources that stand by name.
-    pub fn of(graph: &BondGraph, states: &[State], sources: &[(Symbol, Expr)]) -> Strands {
+    /// Those of states that have no other name, of their rates, and of sources that stand by name.
+    pub fn of(
+        graph: &BondGraph,
+        states: &[State],
+        sources: &[(Symbol, Expr)],
+        aliases: &BTreeMap<Symbol, String>,
+    ) -> Strands {
         let places = places(graph);
         let strand = |place: Option<&(String, usize, usize)>, variable: Option<&str>, rates: usize| {
             let (base, at, of) = place?;
@@ -99,7 +104,7 @@ impl Strands {
             graph.exprs.find_symbol(&name).is_none().then_some(Strand { vector: (name, rates), at: *at, of: *of })
         };
         let mut of = BTreeMap::new();
-        for state in states {
+        for state in states.iter().filter(|state| !aliases.contains_key(&state.symbol)) {
             let Some((part, variable)) = state.name.rsplit_once('.') else { continue };
             for (symbol, rates) in [(state.symbol, 0), (state.rate, 1)] {
                 of.extend(strand(places.get(part), Some(variable), rates).map(|strand| (symbol, strand)));
