@@ -58,6 +58,7 @@ mod wire;
 
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
+pub(crate) use multibonds::{part_name, strand_name};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
 pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};

@@ -33,7 +33,7 @@ pub(super) enum Width {
 }
 
 /// The name of a strand behind that of what it belongs to: `x`, `y`, `z` of up to three, else its number in brackets.
-pub(super) fn strand_name(at: usize, of: usize) -> String {
+pub(crate) fn strand_name(at: usize, of: usize) -> String {
     match ["x", "y", "z"].get(at).filter(|_| of <= 3) {
         Some(letter) => (*letter).to_string(),
         None => format!("[{}]", at + 1),
@@ -46,7 +46,7 @@ pub(super) fn strand_of(letter: &str) -> Option<usize> {
 }
 
 /// The name of a part of something: `gap.el`, `twist[4]`.
-pub(super) fn part_name(of: &str, part: &str) -> String {
+pub(crate) fn part_name(of: &str, part: &str) -> String {
     match part.is_empty() || part.starts_with('[') {
         true => [of, part].concat(),
         false => [of, ".", part].concat(),

@@ -35,7 +35,7 @@ impl Program {
     }
 
     /// Whether an input moves it, of each value.
-    pub fn moved_by_inputs(&self) -> Vec<bool> {
+    fn moved_by_inputs(&self) -> Vec<bool> {
         let mut moved = vec![false; self.values.len()];
         for (value, op) in self.values.iter() {
             moved[value.index()] = match op {

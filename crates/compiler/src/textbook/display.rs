@@ -17,7 +17,7 @@ const SMALL: usize = 2_000;
 /// Terms that may be formed in the search for the form with everything put in.
 const TEXTBOOK: u64 = 400_000;
 /// A side of an equation that is longer in print than this does not fit a page of a textbook: names stay.
-const LONGEST: u64 = 600;
+pub(super) const LONGEST: u64 = 600;
 
 /// Equations with what a textbook would print of them.
 #[derive(Debug, Clone)]
@@ -414,6 +414,5 @@ pub fn put_in_shown(x: &mut Exprs, e: Expr, known: &BTreeMap<Symbol, Expr>) -> E
 
 pub fn textbook(x: &mut Exprs, e: Expr) -> Expr {
     let e = x.textbook(e);
-    let e = x.without_settled_terms(e);
     x.without_idle_terms(e)
 }

@@ -88,7 +88,6 @@ fn with_definitions(d: &Definitions, mut read: BTreeSet<Symbol>, all: &[(Symbol,
 /// An expression in a short form, within a bound of work.
 fn shortened(x: &mut Exprs, e: Expr, work: u64) -> Expr {
     if x.printed_length(e) > SEARCHED {
-        let e = x.without_settled_terms(e);
         return x.without_idle_terms(e);
     }
     x.bound_search(work);

@@ -322,8 +322,8 @@ impl<'a> Written<'a> {
             states.insert(state.symbol, (state.name.as_str(), false));
             states.insert(state.rate, (state.name.as_str(), true));
         }
-        for (&symbol, (name, rates)) in &shown.vectors.names {
-            states.insert(symbol, (name.as_str(), *rates > 0));
+        for (&symbol, (name, is_rate)) in &shown.vectors.names {
+            states.insert(symbol, (name.as_str(), *is_rate));
         }
         let rate_of = equations.states.iter().map(|s| (s.rate, s.symbol)).collect();
         let sources = shown.sources.iter().map(|&(s, _)| (s, element_name(&equations.graph, s))).collect();

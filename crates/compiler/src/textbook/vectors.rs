@@ -3,24 +3,22 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::display::{DisplayEquation, textbook};
+use super::display::{DisplayEquation, LONGEST, textbook};
 use super::text::element_name;
 use crate::algebra::{Expr, Exprs, Facts, Symbol};
-use crate::bond_graph::BondGraph;
+use crate::bond_graph::{BondGraph, part_name, strand_name};
 use crate::equations::State;
 
-/// Strands that have letters for their names.
-const LETTERS: [&str; 3] = ["x", "y", "z"];
-/// What is longer in print is not looked at.
-const LONGEST: u64 = 600;
+/// Strands of a vector at most: those of more have numbers.
+const MOST: usize = 3;
 
 /// Equations of vectors.
 #[derive(Debug, Clone, Default)]
 pub struct Vectors {
     /// The equations, in the order of those that they stand for.
     pub equations: Vec<VectorEquation>,
-    /// The vectors in them, by the name that they have in the model language, and how often their rate is taken.
-    pub names: BTreeMap<Symbol, (String, usize)>,
+    /// The vectors in them, by the name that they have in the model language, and whether it is their rate.
+    pub names: BTreeMap<Symbol, (String, bool)>,
 }
 
 /// An equation of vectors: `left = right + added`.
@@ -37,31 +35,31 @@ pub struct VectorEquation {
 }
 
 /// A strand of a vector.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 struct Strand {
-    vector: (String, usize),
+    vector: (String, bool),
     at: usize,
     of: usize,
 }
 
 /// One equation, in what it has in common with those of other strands, and the rest.
 struct Row {
-    left: ((String, usize), Expr),
-    right: BTreeMap<(String, usize), Expr>,
+    left: ((String, bool), Expr),
+    right: BTreeMap<(String, bool), Expr>,
     rest: Expr,
 }
 
 /// The equations of strands that are alike.
 pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) -> Vectors {
     let mut found = Vectors::default();
-    let mut known: BTreeMap<(String, usize), Symbol> = BTreeMap::new();
+    let mut known: BTreeMap<(String, bool), Symbol> = BTreeMap::new();
     let mut at = 0;
     while at < display.len() {
         let Some(rows) = strands.alike(x, &display[at..]) else {
             at += 1;
             continue;
         };
-        let mut vector = |x: &mut Exprs, of: &(String, usize)| {
+        let mut vector = |x: &mut Exprs, of: &(String, bool)| {
             let symbol = *known.entry(of.clone()).or_insert_with(|| x.fresh(&of.0, Facts::default()));
             found.names.insert(symbol, of.clone());
             x.sym(symbol)
@@ -97,22 +95,22 @@ impl Strands {
         aliases: &BTreeMap<Symbol, String>,
     ) -> Strands {
         let places = places(graph);
-        let strand = |place: Option<&(String, usize, usize)>, variable: Option<&str>, rates: usize| {
+        let strand = |place: Option<&(String, usize, usize)>, variable: Option<&str>, is_rate: bool| {
             let (base, at, of) = place?;
             let name = variable.map_or_else(|| base.clone(), |variable| format!("{base}.{variable}"));
             // What has that name would be taken for the vector.
-            graph.exprs.find_symbol(&name).is_none().then_some(Strand { vector: (name, rates), at: *at, of: *of })
+            graph.exprs.find_symbol(&name).is_none().then_some(Strand { vector: (name, is_rate), at: *at, of: *of })
         };
         let mut of = BTreeMap::new();
         for state in states.iter().filter(|state| !aliases.contains_key(&state.symbol)) {
             let Some((part, variable)) = state.name.rsplit_once('.') else { continue };
-            for (symbol, rates) in [(state.symbol, 0), (state.rate, 1)] {
-                of.extend(strand(places.get(part), Some(variable), rates).map(|strand| (symbol, strand)));
+            for (symbol, is_rate) in [(state.symbol, false), (state.rate, true)] {
+                of.extend(strand(places.get(part), Some(variable), is_rate).map(|strand| (symbol, strand)));
             }
         }
         for &(symbol, _) in sources {
             let name = element_name(graph, symbol);
-            of.extend(strand(places.get(&name), None, 0).map(|strand| (symbol, strand)));
+            of.extend(strand(places.get(&name), None, false).map(|strand| (symbol, strand)));
         }
         Strands(of)
     }
@@ -145,7 +143,7 @@ impl Strands {
         };
         let [(rate, strand)] = &own(x, equation.left)?[..] else { return None };
         let (coefficient, rest) = x.linear_in(equation.left, &[*rate])?;
-        if !x.is_zero(rest) || strand.vector.1 != 1 {
+        if !x.is_zero(rest) || !strand.vector.1 {
             return None;
         }
         let read = own(x, equation.right)?;
@@ -161,17 +159,16 @@ impl Strands {
 fn places(graph: &BondGraph) -> BTreeMap<String, (String, usize, usize)> {
     let mut places = BTreeMap::new();
     for element in graph.elements.values() {
-        if let Some((at, of)) = element.strand
-            && let Some(letter) = LETTERS[..LETTERS.len().min(of as usize)].get(at as usize)
-            && let Some(base) = element.name.strip_suffix(letter).and_then(|name| name.strip_suffix('.'))
-            && of as usize <= LETTERS.len()
+        if let Some((at, of)) = element.strand.map(|(at, of)| (at as usize, of as usize))
+            && of <= MOST
+            && let Some(base) = element.name.strip_suffix(&part_name("", &strand_name(at, of)))
         {
-            places.insert(element.name.clone(), (base.to_string(), at as usize, of as usize));
+            places.insert(element.name.clone(), (base.to_string(), at, of));
         }
-        let ports = &element.ports;
-        let is_wide = (2..=LETTERS.len()).contains(&ports.len()) && ports.iter().zip(LETTERS).all(|(p, l)| p.name == l);
-        for at in (0..ports.len()).filter(|_| is_wide) {
-            places.insert(element.part_name(at), (element.name.clone(), at, ports.len()));
+        let of = element.ports.len();
+        let is_strand = |at: usize| element.ports[at].name == strand_name(at, of);
+        for at in (0..of).filter(|_| (2..=MOST).contains(&of) && (0..of).all(is_strand)) {
+            places.insert(element.part_name(at), (element.name.clone(), at, of));
         }
     }
     places

@@ -83,7 +83,6 @@ struct Next {
 }
 
 /// What has become of the Jacobian along the rates.
-#[derive(Clone, Copy, PartialEq, Eq)]
 enum Change {
     /// It serves.
     Little,
@@ -227,15 +226,24 @@ impl LinearlyImplicitBdf2 {
             self.find_all(system, (t, h), x);
         } else if event || (!follows && *steps >= STEPS_A_LOOK) {
             self.history.steps = 0;
-            match self.change(system, (t, h), x) {
-                Change::Little => {}
-                Change::Some if groups_a_step(self.groups.len()).is_some() => self.want_next(x),
-                Change::Some | Change::Much => self.find_all(system, (t, h), x),
-            }
+            self.look(system, (t, h), x);
         }
         if follows {
             self.find_some(system, (t, h));
         }
+    }
+
+    /// Looks at the Jacobian, and sees to another one where it is due. Whether it has been found at once.
+    fn look(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> bool {
+        match self.change(system, (t, h), x) {
+            Change::Little => return false,
+            Change::Some if groups_a_step(self.groups.len()).is_some() => {
+                self.want_next(x);
+                return false;
+            }
+            Change::Some | Change::Much => self.find_all(system, (t, h), x),
+        }
+        true
     }
 
     /// Finds the Jacobian at once.
@@ -316,7 +324,7 @@ impl LinearlyImplicitBdf2 {
         true
     }
 
-    /// Looks at the Jacobian along the rates.
+    /// What has become of the Jacobian along the rates.
     fn change(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> Change {
         let LinearlyImplicitBdf2 { history, point, rates, way, matrix, .. } = self;
         let History { last, jacobian, scale, .. } = &*history;
@@ -383,13 +391,8 @@ impl LinearlyImplicitBdf2 {
         let ratio = h / before.length;
         if before.ends_at(t) && ratio <= LONGEST {
             self.solve_on(system, (t, h), ratio, x, end)?;
-            let change = if self.is_doubtful(x, end) { self.change(system, (t, h), x) } else { Change::Little };
-            if change == Change::Much || (change == Change::Some && groups_a_step(self.groups.len()).is_none()) {
-                self.find_all(system, (t, h), x);
+            if self.is_doubtful(x, end) && self.look(system, (t, h), x) {
                 return self.begin(system, (t, h), 1, x, end);
-            }
-            if change == Change::Some {
-                self.want_next(x);
             }
             (0..x.len()).for_each(|i| end[i] = x[i] + (self.move_on[i] + end[i]));
             return Ok(());

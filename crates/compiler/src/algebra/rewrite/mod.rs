@@ -194,9 +194,13 @@ impl Exprs {
         self.without_zero_terms(e, &|x, f| x.given_value(f).is_some_and(f64::is_finite))
     }
 
-    /// Without terms `0 f` in which `f` has a value wherever what is left has one.
+    /// The same, and without those in which `f` has a value wherever what is left has one.
     pub fn without_idle_terms(&mut self, e: Expr) -> Expr {
+        let e = self.without_settled_terms(e);
         let left = self.without_zero_terms(e, &|_, _| true);
+        if left == e {
+            return e;
+        }
         let needs = self.needs(left);
         self.without_zero_terms(e, &|x, f| x.needs(f).is_subset(&needs))
     }

@@ -72,6 +72,8 @@ pub(super) struct Plan<'a> {
     pub(super) motion_blocks: Vec<BlockId>,
     /// How many of them, the first ones, rates read.
     motion_of_rates: usize,
+    /// Whether something that is looked at may jump with an input.
+    inputs_jump: bool,
     /// What is found where a step ends, if that saves much.
     pub ahead: Option<Ahead>,
     /// What the sizes of arrays in the model are.
@@ -159,6 +161,7 @@ impl<'a> Plan<'a> {
             shown_blocks: Vec::new(),
             motion_blocks: Vec::new(),
             motion_of_rates: 0,
+            inputs_jump: program.inputs_jump(),
             ahead: None,
             sizes: Sizes::default(),
             passes: Vec::new(),
@@ -370,8 +373,8 @@ impl<'a> Plan<'a> {
 
     /// How many groups of columns of a new Jacobian a step finds, as `halfarrow_sim::fixed_step` does; none where it finds all.
     pub fn groups_a_step(&self) -> Option<usize> {
-        let groups = self.column_groups().len();
-        (self.export.method.keeps_steps() && groups > 3).then(|| groups.div_ceil(16).max(3))
+        let groups = if self.export.method.keeps_steps() { self.column_groups().len() } else { 0 };
+        (groups > 3).then(|| groups.div_ceil(16).max(3))
     }
 }
 

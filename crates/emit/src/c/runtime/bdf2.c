@@ -219,6 +219,23 @@ static void ha_find_some(ha_model *m, double t, $real h)
 }
 
 //end
+//item ha_look_along
+/* Looks at the Jacobian, and sees to another one where it is due. Whether it has been found at once. */
+static int ha_look_along(ha_model *m, double t, $real h, const $real *x)
+{
+    const int change = $ha_change_along(m, t, h, x);
+//if finds_by_parts
+    if (change == 1) {
+        $ha_want_next(m, x);
+        return 0;
+    }
+//end
+    if (change) {
+        $ha_find_all(m, t, h, x);
+    }
+    return change;
+}
+
 //item ha_renew
 /* Finds the Jacobian anew where it is due. */
 static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on)
@@ -234,18 +251,8 @@ static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on
     if (!m->jacobian_known) {
         $ha_find_all(m, t, h, x);
     } else if (looks) {
-        const int change = $ha_change_along(m, t, h, x);
         m->jacobian_steps = 0;
-//if finds_by_parts
-        if (change == 1) {
-            $ha_want_next(m, x);
-        }
-        if (change == 2) {
-//else
-        if (change) {
-//end
-            $ha_find_all(m, t, h, x);
-        }
+        (void)$ha_look_along(m, t, h, x);
     }
 //if finds_by_parts
     if (follows && m->next_groups) {
@@ -372,24 +379,12 @@ static int ha_solve_step(ha_model *m, double t, $real h, const $real *x)
     int i;
     if (m->before_counts && $ha_ends_at(m->before_end, m->before_length, t) && ratio <= $20.0) {
         const int status = $ha_solve_on(m, t, h, ratio, x);
-        int change;
         if (status != $MODEL_OK) {
             return status;
         }
-        change = $ha_is_doubtful(m, x) ? $ha_change_along(m, t, h, x) : 0;
-//if finds_by_parts
-        if (change == 2) {
-//else
-        if (change) {
-//end
-            $ha_find_all(m, t, h, x);
+        if ($ha_is_doubtful(m, x) && $ha_look_along(m, t, h, x)) {
             return $ha_begin(m, t, h, 1, x);
         }
-//if finds_by_parts
-        if (change) {
-            $ha_want_next(m, x);
-        }
-//end
         for (i = 0; i < HA_NX; ++i) {
             m->trial[i] = x[i] + (m->move_on[i] + m->correction[i]);
         }

@@ -25,17 +25,25 @@ static int ha_all_finite(const $real *a, int n)
     return rest[0] + rest[1] + rest[2] + rest[3] == $0.0;
 }
 
-//if looks_ahead
-//item ha_are_equal
-static int ha_are_equal(const $real *a, const $real *b, int n)
+//item ha_is_below
+static int ha_is_below($real a)
 {
-    int i;
-    for (i = 0; i < n && a[i] == b[i]; ++i) {
-    }
-    return i == n;
+    return a < $0.0 || (a == $0.0 && $1.0 / a < $0.0);
 }
 
-//end
+//item ha_same
+/* Whether values are the same, zeros with their signs. */
+static int ha_same(const $real *a, const $real *b, int n)
+{
+    int i;
+    for (i = 0; i < n; ++i) {
+        if (!(a[i] == b[i]) || $ha_is_below(a[i]) != $ha_is_below(b[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 //item ha_copy
 static void ha_copy($real *to, const $real *from, int n)
 {

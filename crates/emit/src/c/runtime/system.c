@@ -78,14 +78,14 @@ static int ha_is_known_ahead(const ha_model *m, double t, const $real *x)
         return 0;
     }
 //end
-    return m->ahead_known && t == m->ahead_t && $ha_are_equal(x, m->ahead_x, HA_NX);
+    return m->ahead_known && t == m->ahead_t && $ha_same(x, m->ahead_x, HA_NX);
 }
 
 //item ha_is_found_ahead
 /* The same with the present inputs. */
 static int ha_is_found_ahead(const ha_model *m, double t, const $real *x)
 {
-    return $ha_is_known_ahead(m, t, x) && $ha_are_equal(m->u, m->ahead_u, HA_NU);
+    return $ha_is_known_ahead(m, t, x) && $ha_same(m->u, m->ahead_u, HA_NU);
 }
 
 //item ha_forget_ahead

@@ -1,9 +1,3 @@
-//item ha_is_below
-static int ha_is_below($real a)
-{
-    return a < $0.0 || (a == $0.0 && $1.0 / a < $0.0);
-}
-
 //if newton_single
 //item ha_scan_distances
 /* Distances from tiny to huge. */
@@ -161,19 +155,6 @@ static int ha_search(ha_model *m, ha_newton *w)
 //else
     return 0;
 //end
-}
-
-//item ha_same
-/* Whether values are the same, zeros with their signs. */
-static int ha_same(const $real *a, const $real *b, int n)
-{
-    int i;
-    for (i = 0; i < n; ++i) {
-        if (!(a[i] == b[i]) || $ha_is_below(a[i]) != $ha_is_below(b[i])) {
-            return 0;
-        }
-    }
-    return 1;
 }
 
 //item ha_has_root
