@@ -54,6 +54,21 @@ link[SIZE] -> FixedTranslation:tip(d = [0, 0, -0.5]) -> 1[frame]:end
 end -> aside.b
 end -> along.b
 "#;
+/// Masses in a row, each on a rope and tied to the next by a string, in a shape of one frequency: the lengths of ropes tell
+/// those of strings, and each length of a rope would be a sum of lengths of strings.
+const ROPES: &str = r#"model Ropes
+param n = SIZE, m = 1 kg, k = 3 N/m, s = 50 N/m
+for i in 1..n {
+    1:v[i] -> I:mass[i](m)
+    if i > 1 {
+        v[i - 1] -> 0:tie[i] -> v[i]
+        tie[i] -> C:string[i](k = s, q0 = 1 m*(cos(pi*(i - 1.5)/n) - cos(pi*(i - 0.5)/n)))
+    }
+    v[i] -> C:rope[i](k = k, q0 = 1 m*cos(pi*(i - 0.5)/n))
+}
+"#;
+/// How the operations of the largest two rows of masses may grow.
+const ROPES_GROW: f64 = 1.01;
 /// How the operations of the largest two chains of hinges may grow.
 const HINGES_GROW: f64 = 1.08;
 
@@ -79,14 +94,18 @@ fn work_grows_with_the_cells() {
         let exponent = exponent(counted, sizes.map(cells));
         assert!(exponent <= most, "{} grows as the power {exponent:.3} of its cells", family.name());
     }
-    for (name, text) in [("hinges", HINGES.to_owned()), ("whip", format!("{HINGES}{BACK_TO_THE_ROOT}"))] {
-        let sizes = [10, 40, 80];
+    let whip = format!("{HINGES}{BACK_TO_THE_ROOT}");
+    for (name, text, sizes, most) in [
+        ("hinges", HINGES, [10, 40, 80], HINGES_GROW),
+        ("whip", &whip, [10, 40, 80], HINGES_GROW),
+        ("ropes", ROPES, [10, 100, 1000], ROPES_GROW),
+    ] {
         let counted = sizes.map(|size| operations(&text.replace("SIZE", &size.to_string())));
         for (size, count) in sizes.iter().zip(counted) {
             _ = writeln!(table, "{name} {size}: {count}");
         }
         let exponent = exponent(counted, sizes);
-        assert!(exponent <= HINGES_GROW, "{name} grows as the power {exponent:.3} of its hinges");
+        assert!(exponent <= most, "{name} grows as the power {exponent:.3} of its cells");
     }
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/growth.txt");
     if std::env::var_os("UPDATE").is_some() {
@@ -117,6 +136,34 @@ fn a_chain_of_parallelograms_turns_as_one_wheel() {
                 "{size}: {} is {}, not {exact}",
                 done.trace.columns[column].name,
                 end(column)
+            );
+        }
+    }
+}
+
+/// Few and many masses on ropes, by the lengths of strings or of ropes: all swing at the frequency of their shape,
+/// `omega² = (k + 4 s sin²(pi/2n))/m`, and the strings go with them.
+#[test]
+fn masses_on_ropes_keep_the_shape_that_they_start_in() {
+    for size in [5, 80] {
+        let model = Model::from_text("ropes.bond", &ROPES.replace("SIZE", &size.to_string()), &[]).expect("a model");
+        let record = ["rope[1].q", "string[2].q", &format!("rope[{size}].q"), &format!("string[{size}].q")];
+        let record = halfarrow::Record::Names(record.map(String::from).to_vec());
+        let run = halfarrow::Run { to: 7.0, rtol: 1e-11, record, ..halfarrow::Run::default() };
+        let done = model.simulate(&run, &mut |_| true).expect("it runs");
+        let n = size as f64;
+        let shape = |i: f64| libm::cos(std::f64::consts::PI * (i - 0.5) / n);
+        let half = libm::sin(std::f64::consts::PI / (2.0 * n));
+        let now = libm::cos(libm::sqrt(3.0 + 200.0 * half * half) * 7.0);
+        for (column, start) in
+            [shape(1.0), shape(1.0) - shape(2.0), shape(n), shape(n - 1.0) - shape(n)].iter().enumerate()
+        {
+            let end = *done.trace.columns[column].values.last().expect("an end");
+            assert!(
+                (end - start * now).abs() < 1e-9,
+                "{size}: {} is {end}, not {}",
+                done.trace.columns[column].name,
+                start * now
             );
         }
     }

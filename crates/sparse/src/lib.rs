@@ -4,9 +4,11 @@
 mod height;
 mod matching;
 mod symbolic;
+mod unions;
 
 pub use matching::Matching;
 pub use symbolic::{SymbolicFactors, full_operations};
+pub use unions::{Columns, Unions};
 
 use std::ops::Range;
 use std::sync::Arc;

@@ -276,10 +276,15 @@ impl<A: Coefficients> Eliminator<A> {
         work
     }
 
-    /// The same, with pivots that are not small at a point, as far as there are any.
-    pub fn near(mut self, point: NumericPoint) -> Eliminator<A> {
-        self.point = Some(point);
+    /// The same, with pivots that are not small at a point, where one is given, as far as there are any.
+    pub fn near(mut self, point: impl Into<Option<NumericPoint>>) -> Eliminator<A> {
+        self.point = point.into();
         self
+    }
+
+    /// The point again, with the values that were found there.
+    pub fn take_point(&mut self) -> Option<NumericPoint> {
+        self.point.take()
     }
 
     /// Whether a coefficient counts as zero.

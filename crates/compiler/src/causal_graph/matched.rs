@@ -83,22 +83,25 @@ pub(super) fn block_rows(
     if blocks.iter().any(|columns| columns.len() > most) {
         return None;
     }
+    let mut point = point.cloned();
     for mut columns in blocks {
         columns.sort_unstable();
-        let own: Vec<SparseRow> = columns.iter().map(|column| rows[row_of[column]].clone()).collect();
+        let own: Vec<&SparseRow> = columns.iter().map(|column| rows[row_of[column]]).collect();
         let before = (columns.len() > 1).then(|| x.assumed());
         if columns.len() > 1 {
-            found.loops.push(columns.iter().copied().zip(own.iter().cloned()).collect());
+            found.loops.push(columns.iter().copied().zip(own.iter().map(|&row| row.clone())).collect());
         }
-        let mut work = Eliminator::new(x, own, 0);
-        if let Some(point) = point {
-            work = work.near(point.clone());
-        }
-        work.eliminate(x, &columns);
+        // A block takes what its own columns take, however many there are in all.
+        let (read, own) = numbered(&own);
+        let own_columns: Vec<usize> = columns.iter().filter_map(|column| read.binary_search(column).ok()).collect();
+        let mut work = Eliminator::new(x, own, read.len()).near(point.take());
+        work.eliminate(x, &own_columns);
+        point = work.take_point();
         let own = work.finish();
         if own.pivots.len() < columns.len() || !own.degenerate.is_empty() {
             return None;
         }
+        let named = |(column, row): Row| (read[column], row.into_iter().map(|(k, e)| (read[k], e)).collect());
         // A single pivot is no quotient.
         let regular = before.and_then(|before| Some((x.if_found(|x| regular_rows(x, &own))?, before)));
         match regular {
@@ -107,16 +110,26 @@ pub(super) fn block_rows(
                 x.forget_unwatched(&before);
                 x.assume_nonzero(regular.determinant);
                 found.add(x, regular.determinant);
-                found.rows.extend(own.pivots.iter().zip(regular.rows).map(|(pivot, row)| (pivot.column, row.0)));
+                found.rows.extend(own.pivots.iter().zip(regular.rows).map(|(pivot, row)| named((pivot.column, row.0))));
             }
             None => {
                 own.watched.iter().for_each(|&divisor| found.add(x, divisor));
                 let solved = own.pivots.iter().map(|pivot| (pivot.column, solved_for(x, &pivot.row, pivot.column)));
-                found.rows.extend(solved.collect::<Vec<_>>());
+                found.rows.extend(solved.map(named));
             }
         }
     }
     Some(found)
+}
+
+/// The columns that rows read, ascending, and the rows with columns by their places among these.
+fn numbered(rows: &[&SparseRow]) -> (Vec<usize>, Vec<SparseRow>) {
+    let mut read: Vec<usize> = rows.iter().flat_map(|row| row.0.iter().map(|e| e.0)).collect();
+    read.sort_unstable();
+    read.dedup();
+    let place = |column: usize| read.binary_search(&column).expect("a row reads it");
+    let own = rows.iter().map(|row| SparseRow(row.0.iter().map(|&(c, e)| (place(c), e)).collect())).collect();
+    (read, own)
 }
 
 /// The columns of every cycle of matched rows, those first that others read.

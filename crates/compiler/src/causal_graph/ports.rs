@@ -398,7 +398,11 @@ impl Net {
         preferences: &CausalityPreferences,
         way: Way,
     ) -> Solved {
-        let demands = circuits(x, done.rest.clone());
+        let mut used: Vec<usize> = done.rest.iter().flat_map(|row| &row.0).map(|e| e.0).collect();
+        used.sort_unstable();
+        used.dedup();
+        let one_by_one: Vec<Vec<usize>> = used.into_iter().map(|column| vec![column]).collect();
+        let demands = circuits(x, done.rest.clone(), &one_by_one);
         let demands = demands.into_iter().map(|(_, row)| self.combination(&row.0)).collect();
         let mut solved = Solved { demands, ..Solved::default() };
         self.report(done, outputs, preferences, (&mut solved, way), x);
@@ -665,13 +669,10 @@ pub(super) fn settled(x: &mut Exprs, e: Expr) -> Expr {
     if x.is_number(minus).is_some() { minus } else { x.simplify(minus) }
 }
 
-/// Fully reduces rows: each of the results is a relation of minimal support, with the column that leads it.
-pub(crate) fn circuits(x: &mut Exprs, rows: Vec<SparseRow>) -> Vec<(usize, SparseRow)> {
-    let mut used: Vec<usize> = rows.iter().flat_map(|r| &r.0).map(|e| e.0).collect();
-    used.sort_unstable();
-    used.dedup();
-    let classes: Vec<Vec<usize>> = used.into_iter().map(|c| vec![c]).collect();
-    let done = eliminate(x, rows, &classes);
+/// Fully reduces rows: each of the results is a relation of minimal support, with the column that leads it. `classes`: the
+/// columns that may lead one, those of an earlier class first.
+pub(crate) fn circuits(x: &mut Exprs, rows: Vec<SparseRow>, classes: &[Vec<usize>]) -> Vec<(usize, SparseRow)> {
+    let done = eliminate(x, rows, classes);
     let mut reduced = back_substitute(&done);
     let mut relations = Vec::with_capacity(done.pivots.len());
     for pivot in &done.pivots {

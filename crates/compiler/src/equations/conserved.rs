@@ -17,6 +17,10 @@ struct BalanceRow {
     row: Combination,
 }
 
+/// Of more balances than this those keep their states by which the others are shortest: in the order of the model the length
+/// of a rope may be a sum along the whole machine.
+const MANY: usize = 32;
+
 /// Finds them, and makes each a constant in place of one state, at most so many.
 ///
 /// With `exchanged`, as independent variables may change places while running, storages that follow others by ratios that
@@ -28,11 +32,11 @@ pub fn eliminate(assembled: &mut Assembled, most: usize, exchanged: bool) -> Vec
     let left = without_own(&columns);
     let core: Vec<usize> = (0..rows.len()).filter(|&r| left[r]).collect();
     let mut found = Vec::new();
-    for vector in null_vectors(assembled, &rows, &core) {
+    for (own, vector) in null_vectors(assembled, &rows, &core) {
         if found.len() == most {
             break;
         }
-        found.extend(replace(assembled, &balances, &vector, found.len() + 1));
+        found.extend(replace(assembled, &balances, (own, &vector), found.len() + 1));
     }
     found
 }
@@ -73,8 +77,11 @@ fn constant_rows(assembled: &mut Assembled, balances: &[BalanceRow]) -> Vec<Vec<
     rows
 }
 
-/// Combinations of rows that vanish: pairs (index of a balance, factor).
-fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[usize]) -> Vec<Vec<(usize, Expr)>> {
+/// A combination of balances that vanishes: the one that follows from the others, and all, by their numbers, with factors.
+type NullVector = (usize, Vec<(usize, Expr)>);
+
+/// Combinations of rows that vanish.
+fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[usize]) -> Vec<NullVector> {
     let mut transposed: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
     for (k, &row) in core.iter().enumerate() {
         for &(column, e) in &rows[row] {
@@ -82,7 +89,12 @@ fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[
         }
     }
     let x = &mut assembled.d.x;
-    let reduced = circuits(x, transposed.into_values().map(SparseRow).collect());
+    let transposed = transposed.into_values().map(SparseRow).collect();
+    let classes = match core.len() > MANY {
+        true => vec![(0..core.len()).collect()],
+        false => (0..core.len()).map(|k| vec![k]).collect::<Vec<_>>(),
+    };
+    let reduced = circuits(x, transposed, &classes);
     let one = x.int(1);
     let mut pivot = vec![false; core.len()];
     let mut vectors: BTreeMap<usize, Vec<(usize, Expr)>> = BTreeMap::new();
@@ -96,20 +108,18 @@ fn null_vectors(assembled: &mut Assembled, rows: &[Vec<(usize, Expr)>], core: &[
     for k in (0..core.len()).filter(|&k| !pivot[k]) {
         vectors.entry(k).or_default().push((core[k], one));
     }
-    vectors
-        .into_values()
-        .map(|mut v| {
-            v.sort_by_key(|t| t.0);
-            v
-        })
-        .collect()
+    for vector in vectors.values_mut() {
+        vector.sort_by_key(|t| t.0);
+    }
+    vectors.into_iter().map(|(k, vector)| (core[k], vector)).collect()
 }
 
-/// Replaces one state of a conserved combination by the constant. `None` if no state can be solved for.
+/// Replaces one state of a conserved combination by the constant, that of the balance which follows from the others if it
+/// can be solved for. `None` if no state can.
 fn replace(
     assembled: &mut Assembled,
     balances: &[BalanceRow],
-    vector: &[(usize, Expr)],
+    (own, vector): (usize, &[(usize, Expr)]),
     number: usize,
 ) -> Option<Conserved> {
     let mut terms = Vec::new();
@@ -120,7 +130,7 @@ fn replace(
     let symbol = assembled.d.x.fresh(&format!("K{number}"), Default::default());
     let constant = assembled.d.x.sym(symbol);
     let residual = assembled.d.x.sub(value, constant);
-    for &(b, _) in vector.iter().rev() {
+    for b in std::iter::once(own).chain(vector.iter().rev().map(|t| t.0)) {
         let state = balances[b].state;
         if let Some(solution) = assembled.d.solve_for(residual, state) {
             let chosen = assembled.states.iter().position(|s| s.symbol == state)?;

@@ -11,7 +11,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rustc_hash::FxHashMap;
+use fixedbitset::FixedBitSet as Set;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EquationStep;
 use super::blocks::{FEW, Row, operations};
@@ -31,6 +32,8 @@ const MOST: usize = 1000;
 const SHORT: usize = 9;
 /// Variables of bonds that are others by name alone are followed so far.
 const ALIASES: usize = 100;
+/// Columns of the matrix of a loop that are found at once.
+const LANES: usize = 8;
 /// Products that may be formed for each variable of a loop: where it takes more, variables are not few at any cut.
 const WORK: usize = 60;
 
@@ -141,11 +144,13 @@ fn with_cuts(
         forms,
         readers,
         rests,
+        depths: Vec::new(),
         gone,
         recognition,
         eliminated: Vec::new(),
         work: 0,
     };
+    open.depths = open.depths();
     let order = open.levels(duals);
     let definite = open.is_definite(&roots, steps);
     if !definite && unknowns.len() > FEW {
@@ -189,6 +194,8 @@ struct Open<'a> {
     readers: Vec<BTreeSet<usize>>,
     /// What they are where all unknowns vanish.
     rests: Vec<Expr>,
+    /// How far variables with definitions are from the unknowns: greater than the depths of all that their forms read.
+    depths: Vec<usize>,
     /// Variables that were put in.
     gone: Vec<bool>,
     recognition: Recognition,
@@ -198,17 +205,22 @@ struct Open<'a> {
 }
 
 impl Open<'_> {
+    /// The longest way from each variable down to the unknowns.
+    fn depths(&self) -> Vec<usize> {
+        let mut depths = vec![0; self.symbols.len()];
+        for k in self.unknowns..self.symbols.len() {
+            depths[k] = 1 + self.forms[k].terms.keys().map(|&j| depths[j]).max().unwrap_or(0);
+        }
+        depths
+    }
+
     /// How far in a variable stands, by the longest way from a motion to the equations; what acts along a motion is put in
     /// just before it.
     fn levels(&self, duals: Vec<Option<usize>>) -> Vec<usize> {
-        let n = self.symbols.len();
-        let (mut from, mut to) = (vec![0; n], vec![0; n]);
-        let next = |known: &[usize], j: usize| if j < self.unknowns { 0 } else { known[j] };
-        for k in self.unknowns..n {
-            from[k] = 1 + self.forms[k].terms.keys().map(|&j| next(&from, j)).max().unwrap_or(0);
-        }
+        let (n, from) = (self.symbols.len(), &self.depths);
+        let mut to = vec![0; n];
         for k in (self.unknowns..n).rev() {
-            to[k] = 1 + self.readers[k].iter().map(|&j| next(&to, j)).max().unwrap_or(0);
+            to[k] = 1 + self.readers[k].iter().map(|&j| if j < self.unknowns { 0 } else { to[j] }).max().unwrap_or(0);
         }
         let level = |k: usize| match duals[k] {
             Some(dual) if dual >= self.unknowns => 2 * to[dual],
@@ -241,15 +253,25 @@ impl Open<'_> {
         let coefficients: Vec<Vec<(usize, f64)>> =
             self.forms.iter().map(|form| form.terms.iter().map(|term| value(term, point)).collect()).collect();
         let mut matrix = vec![0.0; n * n];
-        let mut values = vec![0.0; self.symbols.len()];
-        for column in 0..n {
-            values.fill(0.0);
-            values[column] = 1.0;
-            let sum = |values: &[f64], k: usize| coefficients[k].iter().map(|&(j, e)| e * values[j]).sum::<f64>();
+        let mut values = vec![[0.0; LANES]; self.symbols.len()];
+        for first in (0..n).step_by(LANES) {
+            let columns = first..n.min(first + LANES);
+            values.fill([0.0; LANES]);
+            columns.clone().for_each(|column| values[column][column - first] = 1.0);
+            let sum = |values: &[[f64; LANES]], k: usize| {
+                let add = |mut sum: [f64; LANES], &(j, e): &(usize, f64)| {
+                    sum.iter_mut().zip(&values[j]).for_each(|(sum, value)| *sum += e * value);
+                    sum
+                };
+                coefficients[k].iter().fold([0.0; LANES], add)
+            };
             for k in n..self.symbols.len() {
                 values[k] = sum(&values, k);
             }
-            (0..n).for_each(|row| matrix[row * n + column] = sum(&values, row));
+            for row in 0..n {
+                let found = sum(&values, row);
+                matrix[row * n + first..row * n + columns.end].copy_from_slice(&found[..columns.len()]);
+            }
         }
         matrix
     }
@@ -277,7 +299,7 @@ impl Open<'_> {
 
     /// Eliminates unknowns where the rest of the loop is cut off, those furthest out first.
     fn eliminate(&mut self, order: &[usize], cut: Cut) -> Option<()> {
-        let mut unknowns: Vec<(usize, usize)> = (0..self.unknowns).map(|k| (self.between(k).len(), k)).collect();
+        let mut unknowns: Vec<(usize, usize)> = self.between_all().into_iter().zip(0..).collect();
         unknowns.sort_unstable();
         for (_, k) in unknowns {
             let between = self.between(k);
@@ -301,25 +323,40 @@ impl Open<'_> {
         self.readers[k].iter().any(|&j| j >= self.unknowns)
     }
 
-    /// The variables through which the residual of an unknown reads the unknown.
-    fn between(&self, k: usize) -> BTreeSet<usize> {
-        let read = self.reached(k, &|j| self.forms[j].terms.keys().copied().collect());
-        let reading = self.reached(k, &|j| self.readers[j].iter().copied().collect());
-        (self.unknowns..self.symbols.len()).filter(|&j| read[j] && reading[j]).collect()
+    /// How many variables there are for each unknown through which its residual reads it.
+    fn between_all(&self) -> Vec<usize> {
+        let (n, all) = (self.unknowns, self.symbols.len());
+        // The unknowns that variables read, and those whose residuals read them.
+        let (mut reads, mut is_read) = (vec![Set::with_capacity(n); all], vec![Set::with_capacity(n); all]);
+        for k in 0..n {
+            reads[k].insert(k);
+            is_read[k].insert(k);
+        }
+        for k in n..all {
+            let mut set = std::mem::take(&mut reads[k]);
+            self.forms[k].terms.keys().for_each(|&j| set.union_with(&reads[j]));
+            reads[k] = set;
+        }
+        let mut count = vec![0; n];
+        for k in (n..all).rev() {
+            let mut set = std::mem::take(&mut is_read[k]);
+            self.readers[k].iter().for_each(|&j| set.union_with(&is_read[j]));
+            set.intersection(&reads[k]).for_each(|unknown| count[unknown] += 1);
+            is_read[k] = set;
+        }
+        count
     }
 
-    /// The variables with definitions that are reached from an unknown.
-    fn reached(&self, k: usize, next: &dyn Fn(usize) -> Vec<usize>) -> Vec<bool> {
-        let mut seen = vec![false; self.symbols.len()];
-        let mut open = vec![k];
-        while let Some(j) = open.pop() {
-            for next in next(j) {
-                if next >= self.unknowns && !std::mem::replace(&mut seen[next], true) {
-                    open.push(next);
-                }
-            }
-        }
-        seen
+    /// The variables through which the residual of an unknown reads the unknown.
+    fn between(&self, k: usize) -> BTreeSet<usize> {
+        let reading = |j: usize| self.readers[j].iter().copied().filter(|&j| j >= self.unknowns);
+        let Some(least) = reading(k).map(|j| self.depths[j]).min() else { return BTreeSet::new() };
+        // What is less deep than all that read the unknown does not read it.
+        let read =
+            |j: usize| self.forms[j].terms.keys().copied().filter(|&j| j >= self.unknowns && self.depths[j] >= least);
+        let below = reached(k, |j, found| found.extend(read(j)));
+        let found = reached(k, |j, found| found.extend(reading(j).filter(|j| below.contains(j))));
+        found.into_iter().collect()
     }
 
     /// How many other variables the residual of an unknown reads through these.
@@ -437,6 +474,7 @@ impl Open<'_> {
                 } else {
                     self.forms[row].terms.insert(j, sum);
                     self.readers[j].insert(row);
+                    self.deepen(row, self.depths[j]);
                 }
             }
             let rest = self.x.mul(&[factor, form.rest]);
@@ -447,6 +485,17 @@ impl Open<'_> {
             touched.insert(j);
         }
         touched
+    }
+
+    /// A variable reads another of this depth, and may be deeper than before.
+    fn deepen(&mut self, k: usize, least: usize) {
+        let mut open = vec![(k, least)];
+        while let Some((k, least)) = open.pop() {
+            if k >= self.unknowns && self.depths[k] <= least && least < self.symbols.len() {
+                self.depths[k] = least + 1;
+                open.extend(self.readers[k].iter().map(|&j| (j, least + 1)));
+            }
+        }
     }
 
     /// A form by the values of variables, of which it counts what the unknowns make of them.
@@ -480,6 +529,16 @@ impl Open<'_> {
         let after = in_order(self.x, values)?;
         Some(Recursion { named: self.recognition.named, left, rows, eliminated: self.eliminated, after })
     }
+}
+
+/// All that is reached from somewhere.
+fn reached(from: usize, mut next: impl FnMut(usize, &mut Vec<usize>)) -> FxHashSet<usize> {
+    let (mut seen, mut open, mut found) = (FxHashSet::default(), vec![from], Vec::new());
+    while let Some(k) = open.pop() {
+        next(k, &mut found);
+        open.extend(found.drain(..).filter(|&j| seen.insert(j)));
+    }
+    seen
 }
 
 /// Definitions, each behind those that it reads; `None` if they read each other.
@@ -520,17 +579,20 @@ fn is_symmetric(n: usize, matrix: &[f64]) -> bool {
     })
 }
 
-/// Whether a symmetric matrix is definite.
+/// Whether a symmetric matrix is definite; its lower half is read.
 fn has_positive_pivots(n: usize, mut matrix: Vec<f64>) -> bool {
+    let mut column = vec![0.0; n];
     for k in 0..n {
         let pivot = matrix[k * n + k];
         if pivot.is_nan() || pivot <= 0.0 {
             return false;
         }
+        (k + 1..n).for_each(|i| column[i] = matrix[i * n + k]);
         for i in k + 1..n {
-            let factor = matrix[i * n + k] / pivot;
+            let factor = column[i] / pivot;
             if factor != 0.0 {
-                (k..n).for_each(|j| matrix[i * n + j] -= factor * matrix[k * n + j]);
+                let row = &mut matrix[i * n + k + 1..=i * n + i];
+                row.iter_mut().zip(&column[k + 1..=i]).for_each(|(own, above)| *own -= factor * above);
             }
         }
     }

@@ -1,9 +1,11 @@
 //! Which unknowns of a loop its variables read, and what solving for them costs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
 
 use crate::algebra::{Expr, Exprs, Symbol};
-use crate::sparse::{Pattern, SymbolicFactors, full_operations};
+use crate::sparse::{Columns, Pattern, SymbolicFactors, Unions, full_operations};
 
 /// The unknowns of a loop, and where its matrix has entries.
 #[derive(Debug)]
@@ -18,21 +20,24 @@ impl Supports {
     /// more than `longest` unknowns is an unknown itself; its row is that of its definition.
     pub fn of(x: &Exprs, unknowns: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr], longest: usize) -> Supports {
         let mut unknown: BTreeMap<Symbol, usize> = unknowns.iter().enumerate().map(|(k, &s)| (s, k)).collect();
-        let mut of: BTreeMap<Symbol, BTreeSet<usize>> =
-            unknown.iter().map(|(&s, &k)| (s, BTreeSet::from([k]))).collect();
+        let only = |k: usize| Columns::from([k as u32]);
+        let mut of: FxHashMap<Symbol, Columns> = unknown.iter().map(|(&s, &k)| (s, only(k))).collect();
+        let mut unions = Unions::default();
         let mut rows = Vec::new();
         for &(symbol, value) in body {
-            let mut read = reads(x, value, &of);
+            let mut read = unions.of(x.symbols_of(value).iter().filter_map(|s| of.get(s)));
             if read.len() > longest {
-                let own = unknown.len();
-                unknown.insert(symbol, own);
-                read.insert(own);
-                rows.push(std::mem::replace(&mut read, BTreeSet::from([own])));
+                let own = only(unknown.len());
+                unknown.insert(symbol, unknown.len());
+                rows.push(unions.of([&read, &own]));
+                read = own;
             }
             of.insert(symbol, read);
         }
-        let residuals = residuals.iter().map(|&residual| reads(x, residual, &of));
-        let pattern = Pattern::new(residuals.chain(rows).collect::<Vec<_>>());
+        let residual = |&residual: &Expr| unions.of(x.symbols_of(residual).iter().filter_map(|s| of.get(s)));
+        let residuals: Vec<Columns> = residuals.iter().map(residual).collect();
+        let columns = |row: &Columns| row.iter().map(|&column| column as usize).collect::<Vec<_>>();
+        let pattern = Pattern::new(residuals.iter().chain(&rows).map(columns));
         Supports { unknown, pattern }
     }
 
@@ -46,8 +51,4 @@ impl Supports {
 pub fn to_solve(pattern: &Pattern) -> u64 {
     let full = full_operations(pattern.size());
     SymbolicFactors::of_large(pattern).map_or(full, |factors| factors.operations())
-}
-
-fn reads(x: &Exprs, e: Expr, of: &BTreeMap<Symbol, BTreeSet<usize>>) -> BTreeSet<usize> {
-    x.symbols_of(e).iter().filter_map(|s| of.get(s)).flatten().copied().collect()
 }

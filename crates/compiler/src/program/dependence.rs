@@ -5,17 +5,15 @@ use super::op::Op;
 use super::values::Reads;
 use super::{Position, Value};
 use crate::ids::Id;
+use crate::sparse::{Columns, Unions};
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
-use std::rc::Rc;
-
-type Set = Rc<[u32]>;
 
 /// The states, and after them the conserved constants and positions that are found by iteration, that values read; what only
 /// moves a condition does not count.
 pub(super) struct Dependence {
     /// By value; none for those that were not wanted and that one other value reads.
-    sets: Vec<Option<Set>>,
+    sets: Vec<Option<Columns>>,
     states: u32,
 }
 
@@ -41,25 +39,26 @@ impl Dependence {
 impl Dataflow<'_> {
     /// The states, and after them the conserved constants, that each value reads; of values that one other value reads
     /// the set is not kept, so that a long sum has one set.
-    fn state_sets(self, states: u32, (first, positions): (u32, &[Position]), wanted: &[Value]) -> Vec<Option<Set>> {
-        let none: Set = Rc::from([]);
+    fn state_sets(self, states: u32, (first, positions): (u32, &[Position]), wanted: &[Value]) -> Vec<Option<Columns>> {
+        let none = Columns::from([]);
+        let mut unions = Unions::default();
         let positions: BTreeMap<Value, u32> = positions.iter().map(|p| p.value).zip(first..).collect();
         let readers = self.readers(wanted);
-        let mut sets: Vec<Option<Set>> = Vec::with_capacity(self.values.len());
-        let mut blocks: Vec<Option<Set>> = vec![None; self.blocks.len()];
+        let mut sets: Vec<Option<Columns>> = Vec::with_capacity(self.values.len());
+        let mut blocks: Vec<Option<Columns>> = vec![None; self.blocks.len()];
         for (value, op) in self.values.iter() {
             let set = match op {
-                Op::State(i) | Op::Rate(i) => Some(Rc::from([i])),
-                Op::Conserved(i) => Some(Rc::from([states + i])),
-                Op::Solution(..) if positions.contains_key(&value) => Some(Rc::from([positions[&value]])),
+                Op::State(i) | Op::Rate(i) => Some(Columns::from([i])),
+                Op::Conserved(i) => Some(Columns::from([states + i])),
+                Op::Solution(..) if positions.contains_key(&value) => Some(Columns::from([positions[&value]])),
                 Op::Sign(..) | Op::Floor(..) | Op::Positive(_) => Some(none.clone()),
                 Op::Solution(block, _) => {
-                    let all = || self.gathered(&sets, self.blocks[block].reads().collect());
+                    let all = || self.gathered(&mut unions, &sets, self.blocks[block].reads().collect());
                     Some(blocks[block.index()].get_or_insert_with(all).clone())
                 }
                 _ if self.values.reads(value) == Reads::PARAMETERS => Some(none.clone()),
                 _ if readers[value.index()] == 1 => None,
-                _ => Some(self.gathered(&sets, operands(op))),
+                _ => Some(self.gathered(&mut unions, &sets, operands(op))),
             };
             sets.push(set);
         }
@@ -76,15 +75,15 @@ impl Dataflow<'_> {
     }
 
     /// The union of what values read.
-    fn gathered(self, sets: &[Option<Set>], mut open: SmallVec<[Value; 4]>) -> Set {
-        let mut parts: SmallVec<[&Set; 4]> = SmallVec::new();
+    fn gathered(self, unions: &mut Unions, sets: &[Option<Columns>], mut open: SmallVec<[Value; 4]>) -> Columns {
+        let mut parts: SmallVec<[&Columns; 4]> = SmallVec::new();
         while let Some(value) = open.pop() {
             match &sets[value.index()] {
                 Some(set) => parts.push(set),
                 None => open.extend(operands(self.values.op(value))),
             }
         }
-        union(parts)
+        unions.of(parts)
     }
 }
 
@@ -92,17 +91,4 @@ fn operands(op: Op) -> SmallVec<[Value; 4]> {
     let mut all = SmallVec::new();
     op.for_each_operand(|v| all.push(v));
     all
-}
-
-fn union(mut parts: SmallVec<[&Set; 4]>) -> Set {
-    parts.sort_unstable_by_key(|set| (std::cmp::Reverse(set.len()), Rc::as_ptr(set).cast::<u32>()));
-    parts.dedup_by(|a, b| Rc::ptr_eq(a, b) || a.is_empty());
-    let [first, rest @ ..] = &parts[..] else { return Rc::from([]) };
-    if rest.is_empty() {
-        return Rc::clone(first);
-    }
-    let mut all: SmallVec<[u32; 16]> = parts.iter().flat_map(|set| set.iter().copied()).collect();
-    all.sort_unstable();
-    all.dedup();
-    if all.len() == first.len() { Rc::clone(first) } else { Rc::from(&all[..]) }
 }
