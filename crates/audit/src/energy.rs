@@ -124,6 +124,7 @@ impl IntegratedQuantity<'_> {
         let jumps = jumps(times, self.x, JUMPED * greatest(self.x));
         let miss = |k: usize| self.x[k] - self.x[0] - jumps[k] - integral.values[k];
         let stands_out = |k: usize| (scale.relative(miss(k)), scale.relative(integral.uncertainty[k]));
+        worst.leaves_open(scale.relative(integral.uncertainty.last().copied().unwrap_or(0.0)));
         let beyond = |a: usize, b: usize| above(stands_out(b), stands_out(a));
         let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
         let place = format!("{}: what it holds against its rate", self.name);

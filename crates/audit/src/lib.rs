@@ -79,6 +79,8 @@ pub struct Audit {
     pub at_once: Vec<(usize, Finding)>,
     /// Stored quantities and integrated signals against the integrals of their rates, relative to their range.
     pub rates: Option<Finding>,
+    /// The most that the samples leave open of energy and rates, wherever that is: what is missed there does not show.
+    pub open: f64,
     /// How far positions have drifted from relations that their speeds keep.
     pub drift: Vec<Drift>,
     /// Storages that make or eat energy, and why.
@@ -228,6 +230,7 @@ impl Auditor {
                 .collect(),
             residual: self.residual.finding(&settled),
             rates: self.rates.finding(&settled),
+            open: self.energy.open().max(self.rates.open()),
             drift: self.relations.into_iter().map(drift::Relation::finish).collect(),
             notes,
             events,

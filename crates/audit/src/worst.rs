@@ -34,6 +34,8 @@ pub(crate) struct Worst {
     now: Option<(Finding, Raw)>,
     /// Which law that is of.
     law: usize,
+    /// The most that the samples leave open.
+    open: f64,
 }
 
 impl Worst {
@@ -59,10 +61,21 @@ impl Worst {
 
     fn keep_of(&mut self, law: usize, raw: Raw, settled: &Settled) {
         let found = raw.measured(settled);
+        self.leaves_open(found.resolution);
         let first = |now: &Finding| pair(&found) == pair(now) && law < self.law;
         if self.now.as_ref().is_none_or(|(now, _)| above(pair(&found), pair(now)) || first(now)) {
             (self.now, self.law) = (Some((found, raw)), law);
         }
+    }
+
+    /// So much is left open somewhere, relative to what is there.
+    pub fn leaves_open(&mut self, resolution: f64) {
+        self.open = self.open.max(resolution);
+    }
+
+    /// The most that the samples leave open, relative to what is there.
+    pub fn open(&self) -> f64 {
+        self.open
     }
 
     /// A part of the run is over.

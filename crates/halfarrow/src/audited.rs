@@ -47,6 +47,12 @@ pub struct AuditReport {
     pub residual: Option<Deviation>,
     /// Stored quantities and integrated signals against the integrals of their rates.
     pub rates: Option<Deviation>,
+    /// The most that the samples leave open of energy and rates, wherever that is: what is missed there does not show.
+    #[serde(skip)]
+    pub open: f64,
+    /// How far a run by half the step has gone elsewhere: of implicit steps of fixed length, where the samples leave much open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub halved: Option<Deviation>,
     /// What storages have gained by the events of the model, in J, by their names; below 0 what they have lost.
     pub events: BTreeMap<String, f64>,
     /// How far positions have drifted from relations that their speeds keep, and nothing else.
@@ -526,6 +532,7 @@ impl From<Audit> for AuditReport {
             at_once: a.at_once.into_iter().map(|(steps, found)| (steps, found.into())).collect(),
             residual: miss(a.residual),
             rates: miss(a.rates),
+            open: a.open,
             drift: a.drift.into_iter().map(DriftReport::from).collect(),
             notes: a.notes,
             events: a.events,

@@ -41,6 +41,7 @@ mod export;
 mod families;
 mod fit;
 mod gradient;
+mod halving;
 mod input;
 mod interface;
 #[cfg(feature = "fmu")]

@@ -27,10 +27,11 @@ use crate::cost;
 use crate::error::{Error, Problem};
 use crate::execution::{RoutineReport, execute, executed};
 use crate::gradient::{Taped, is_stiff};
+use crate::halving;
 use crate::input::{Input, connect};
 use crate::model::Model;
 use crate::sensitivity::{By, column, quantities, vary, with_derivatives};
-use crate::verdict::Made;
+use crate::verdict::{Made, OPEN};
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
 /// their declarations give.
@@ -334,7 +335,17 @@ impl Model {
         let begun = Moment::now();
         let Begun { start, options, by, notes } = self.begin_explicit(&mut system, run)?;
         timings.start = begun.elapsed().as_secs_f64();
-        self.integrate(&mut system, start, (&options, run.execution, &by), (notes, None), progress)
+        let steps_over = matches!(options.method, Method::Fixed(method) if method.is_implicit());
+        let again = steps_over.then(|| (system.clone(), start.clone()));
+        let mut done =
+            self.integrate(&mut system, start, (&options, run.execution, &by), (notes, None), &mut *progress)?;
+        if let Some((mut system, start)) = again.filter(|_| done.report.audit.open > OPEN) {
+            let options = Options { step: options.step.map(|step| 0.5 * step), ..options };
+            let halved =
+                self.integrate(&mut system, start, (&options, run.execution, &by), (Vec::new(), None), progress);
+            done.report.audit.halved = halved.ok().and_then(|halved| halving::apart(&done.trace, &halved.trace));
+        }
+        Ok(done)
     }
 
     /// A run that can be followed backwards.

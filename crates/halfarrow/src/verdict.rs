@@ -31,6 +31,12 @@ const ESTIMATED: f64 = 4.0;
 /// itself: what turns within a step looks like a miss.
 const COARSE: f64 = 0.05;
 
+/// Samples of implicit steps of fixed length that leave more open than this may hide an error: what decays within a step leaves as
+/// much. A run by half the step tells.
+pub(crate) const OPEN: f64 = 0.05;
+/// What half the step changes by more than this part of what is there is said.
+const HALVED: f64 = 0.05;
+
 /// What an audit means for a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -193,7 +199,10 @@ impl AuditReport {
             let (verdict, remedy) = judged((miss, bounds, remedy))?;
             Some(Beyond { miss: miss.as_ref()?, verdict, remedy })
         });
-        found.chain(self.beyond_at_once(made)).collect()
+        let halved = self.halved.iter().filter(|miss| miss.value.is_nan() || miss.value > HALVED);
+        let halved =
+            halved.map(|miss| Beyond { miss, verdict: Verdict::Doubtful, remedy: made.remedy_for_integrals() });
+        found.chain(self.beyond_at_once(made)).chain(halved).collect()
     }
 }
 

@@ -9,6 +9,10 @@ use smallvec::SmallVec;
 /// Numbers of columns, ascending; whoever reads the same ones may share them.
 pub type Columns = Rc<[u32]>;
 
+/// The parts of a union, and where each stands.
+type Parts = SmallVec<[Columns; 4]>;
+type Addresses = SmallVec<[usize; 4]>;
+
 /// Unions of fewer columns than this are found faster than they are looked up.
 const FEW: usize = 32;
 
@@ -16,7 +20,7 @@ const FEW: usize = 32;
 #[derive(Debug, Default)]
 pub struct Unions {
     /// By the addresses of the parts, which are kept so that nothing else comes to stand there.
-    known: FxHashMap<SmallVec<[usize; 4]>, (SmallVec<[Columns; 4]>, Columns)>,
+    known: FxHashMap<Addresses, (Parts, Columns)>,
     merged: [Vec<u32>; 2],
 }
 
@@ -38,7 +42,7 @@ impl Unions {
             return Columns::clone(first);
         }
         let many = first.len() >= FEW;
-        let key: SmallVec<[usize; 4]> = parts.iter().filter(|_| many).map(|part| address(part)).collect();
+        let key: Addresses = parts.iter().filter(|_| many).map(|part| address(part)).collect();
         if many && let Some((_, known)) = self.known.get(&key) {
             return Columns::clone(known);
         }

@@ -4,7 +4,7 @@ use super::builder::{Builder, Value};
 use super::constraint::HeldDisplacement;
 use super::dimension::Quantity;
 use super::flatten::{Part, Word};
-use super::multibonds::Width;
+use super::multibonds::{Width, strand_name};
 use super::set_valued::is_set_valued;
 use super::value::Reading;
 use super::{Initial, Kind, Matrix, ResistorLaw, Storage, StorageLaw};
@@ -885,11 +885,14 @@ impl<'a> Builder<'a, '_> {
                 fine &= absent || self.coefficient_units(part, letter, bare, (i, j), value, arg);
             }
         }
-        if ports == 1 && fine {
-            fine &= self.not_zero(part, letter, rows[0][0].expr, arg.span);
-        }
         let entries = rows.into_iter().map(|row| row.into_iter().map(|v| v.expr).collect()).collect();
-        fine.then_some(Some(Coefficients { letter, entries }))
+        let coefficients = Coefficients { letter, entries };
+        // Where strands have to do with each other none of them alone tells what is stored.
+        if fine && (ports == 1 || coefficients.is_diagonal(self, part)) {
+            fine =
+                (0..ports).all(|at| self.not_zero(part, letter, coefficients.entries[at][at], (at, ports), arg.span));
+        }
+        fine.then_some(Some(coefficients))
     }
 
     fn matrix(&mut self, part: usize, arg: &'a Arg, ports: usize) -> Option<Vec<Vec<Value>>> {
@@ -979,17 +982,20 @@ impl<'a> Builder<'a, '_> {
         true
     }
 
-    /// An inertance or compliance of zero is no storage.
-    fn not_zero(&mut self, part: usize, letter: &str, expr: Expr, span: Span) -> bool {
+    /// An inertance or compliance of zero is no storage, in no strand.
+    fn not_zero(&mut self, part: usize, letter: &str, expr: Expr, (at, of): (usize, usize), span: Span) -> bool {
         if !matches!(letter, "m" | "l" | "c") || self.value_of(expr) != Some(0.0) {
             return true;
         }
         let p = self.part(part);
-        let (name, remedy) = match letter {
-            "c" => ("compliance", "leave the element out (a rigid joint)"),
-            _ => ("inertance", "leave the element out"),
+        let (name, remedy) = match (letter, of) {
+            ("c", 1) => ("compliance", "leave the element out (a rigid joint)"),
+            (_, 1) => ("inertance", "leave the element out"),
+            ("c", _) => ("compliance", "write a small one, or one element for each strand that gives way"),
+            _ => ("inertance", "write a small one, or one element for each strand that has some"),
         };
-        let title = format!("the {name} of `{}` is 0", p.name);
+        let strand = if of == 1 { String::new() } else { format!(" in strand {}", strand_name(at, of)) };
+        let title = format!("the {name} of `{}` is 0{strand}", p.name);
         self.fault(Diagnostic::error(codes::L008, title, span, "0 at the given parameters").hint(remedy));
         false
     }

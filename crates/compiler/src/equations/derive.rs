@@ -485,7 +485,10 @@ fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable
         span,
         "nobody says how fast this changes",
     )
-    .note("it sets the ratio between storages that depend on each other; when the ratio changes, so do their momenta")
+    .note(
+        "its rate acts there: a signal takes its derivative, or it sets the ratio between storages that depend on each \
+         other, whose momenta change with it",
+    )
     .hint(format!("pass it through a filter, `state n' = ({input} - n)/tau`, and use n"))
     .into()
 }

@@ -382,10 +382,10 @@ fn add_input(graph: &mut BondGraph, name: &str) -> bool {
     true
 }
 
-/// The declared outputs; without any the states.
+/// The declared outputs; without any the states, but for those that stand still in this mode.
 fn default_outputs(graph: &BondGraph, program: &Program) -> Vec<String> {
     match graph.outputs.is_empty() {
-        true => program.states.iter().map(|s| s.name.clone()).collect(),
+        true => program.states.iter().take(program.tracked.len()).map(|s| s.name.clone()).collect(),
         false => graph.outputs.iter().map(|o| o.name.clone()).collect(),
     }
 }

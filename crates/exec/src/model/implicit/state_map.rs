@@ -65,9 +65,9 @@ impl StateMap {
             let told = if is_state { &own.variables } else { &own.momenta };
             pairs.extend(told.get(symbol).map(|&value| (k, value)));
         }
-        let known = |i: &usize| there(&own.tracked[*i]).is_some();
-        let known: Vec<usize> = (0..n).filter(known).collect();
-        let untold: Vec<usize> = (0..n).filter(|i| !known.contains(i)).collect();
+        // States behind those that variables tell stand still.
+        let tracked = 0..own.tracked.len();
+        let (known, untold): (Vec<usize>, Vec<usize>) = tracked.partition(|&i| there(&own.tracked[i]).is_some());
         let both = own.variables.iter().filter_map(|(s, v)| Some((*v, there(s)?)));
         let (common, common_there): (Vec<Value>, Vec<Value>) = both.filter(|_| !untold.is_empty()).unzip();
         let told: Vec<Value> = known.iter().filter_map(|&i| there(&own.tracked[i])).collect();
