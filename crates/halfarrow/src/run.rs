@@ -435,7 +435,6 @@ impl Model {
     ) -> Result<Simulated, Error> {
         let mut sink = Recorder::new(system, by, notes, progress);
         let options = &with_derivatives(system, options, by, x.len());
-        let names: Vec<String> = system.program().states.iter().map(|state| state.name.clone()).collect();
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
         let mut outcome = match taped {
@@ -448,6 +447,8 @@ impl Model {
         if let Err(stopped) = &mut outcome {
             stopped.failure = audited.explain(stopped);
         }
+        // Those of the mode in which it ends.
+        let names = audited.model().program().own_states().iter().map(|state| state.name.clone()).collect();
         let tolerances = sink.tolerances(names);
         let mut notes = sink.notes;
         notes.extend(audited.notes(outcome.as_ref().err().map(|s| &s.failure)));

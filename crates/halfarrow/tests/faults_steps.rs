@@ -387,4 +387,6 @@ fn a_state_that_stands_still_in_a_mode_has_no_part_in_equations_and_matrices() {
     let linear =
         model.linearize(&halfarrow::Linearize::default()).unwrap_or_else(|error| panic!("{}", error.render(false)));
     assert!(linear.outputs.iter().all(|output| !output.name.starts_with("idle")), "{:?}", linear.outputs);
+    let kept = run(&model, Run { to: 0.5, ..Run::default() }).report.tolerances;
+    assert!(kept.iter().all(|kept| !kept.name.starts_with("idle")), "{kept:?}");
 }

@@ -6,7 +6,6 @@ use super::by_size::solve_part_by_size;
 use super::ports::{CausalityPreferences, Solved, Virtual, is_imposed, solve_part};
 use super::repeated::without_repeated;
 use super::signals::{NodeId, signal_graph};
-use super::span::Span;
 use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
 use super::verify::verify;
@@ -661,6 +660,37 @@ pub(super) fn is_triangular(definitions: &[(Symbol, Combination)]) -> bool {
         }
     }
     done == definitions.len()
+}
+
+/// What co-energy variables and imposed variables span.
+struct Span<'a> {
+    graph: &'a BondGraph,
+    ports: Ports,
+    /// Roles of ports by the variables that they are given.
+    roles: BTreeMap<Symbol, Role>,
+    known: Map<Symbol, Combination>,
+}
+
+impl<'a> Span<'a> {
+    fn of(graph: &'a BondGraph, solved: &Solved) -> Span<'a> {
+        Span {
+            graph,
+            ports: Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() },
+            roles: solved.ports.iter().map(|p| (p.input, p.role)).collect(),
+            known: Map::new(),
+        }
+    }
+
+    /// Whether the common variable of a junction is a combination of them, not of imposed variables alone.
+    fn holds(&mut self, x: &mut Exprs, speed: &Virtual) -> bool {
+        let junction = &self.graph.elements[speed.junction];
+        let bond = &self.graph.bonds[junction.ports[0].bond];
+        let common = if matches!(junction.kind, Kind::One) { bond.flow } else { bond.effort };
+        let row = self.ports.resolve(x, common, &mut self.known);
+        let roles: Option<Vec<Role>> = row.0.iter().map(|t| self.roles.get(&t.0).copied()).collect();
+        let spanning = |role: &Role| matches!(role, Role::Independent | Role::Source | Role::Redundant);
+        roles.is_some_and(|roles| roles.iter().all(spanning) && roles.contains(&Role::Independent))
+    }
 }
 
 /// Strokes from the exact causality of the ports; bonds that it leaves open are completed by a matching.

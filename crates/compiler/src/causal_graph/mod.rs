@@ -20,7 +20,6 @@ mod roles;
 mod rules;
 mod shares;
 pub mod signals;
-mod span;
 pub(crate) mod start_point;
 mod strokes;
 mod text;

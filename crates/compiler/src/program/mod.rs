@@ -312,6 +312,11 @@ pub struct Observed {
 const LONG: usize = 10_000;
 
 impl Program {
+    /// The states that variables tell; behind them are those that stand still in this mode, which nobody asks for.
+    pub fn own_states(&self) -> &[State] {
+        &self.states[..self.tracked.len()]
+    }
+
     /// Number of unknowns of the start: states, then conserved constants, then positions.
     pub fn start_unknowns(&self) -> usize {
         self.states.len() + self.conserved.len() + self.positions.len()

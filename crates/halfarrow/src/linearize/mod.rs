@@ -212,7 +212,7 @@ impl Model {
         let present = self.as_in(&system);
         let equations =
             if self.graph.set_valued.is_empty() { equations } else { present.equations_in(Form::Minimal)? };
-        x.truncate(system.program().tracked.len());
+        x.truncate(system.program().own_states().len());
         if !self.graph.set_valued.is_empty() {
             notes
                 .push(format!("set-valued laws keep the branches that they have there: {}", present.graph.mode_name()));
@@ -382,10 +382,10 @@ fn add_input(graph: &mut BondGraph, name: &str) -> bool {
     true
 }
 
-/// The declared outputs; without any the states, but for those that stand still in this mode.
+/// The declared outputs; without any the states.
 fn default_outputs(graph: &BondGraph, program: &Program) -> Vec<String> {
     match graph.outputs.is_empty() {
-        true => program.states.iter().take(program.tracked.len()).map(|s| s.name.clone()).collect(),
+        true => program.own_states().iter().map(|s| s.name.clone()).collect(),
         false => graph.outputs.iter().map(|o| o.name.clone()).collect(),
     }
 }
@@ -413,7 +413,7 @@ fn states(program: &Program, x: &[f64], rates: &[f64]) -> Vec<StateAt> {
         rate: *rate,
         unit: unit(&state.unit),
     };
-    program.states.iter().zip(x).zip(rates).map(state).collect()
+    program.own_states().iter().zip(x).zip(rates).map(state).collect()
 }
 
 /// The values of computed positions, which from now on are what is recorded.
