@@ -787,7 +787,7 @@ fn forward(done: &Simulated, sample: usize) -> f64 {
     let at = |name: String| column(done, &name)[sample];
     let of = |w: &str| {
         let (cos, sin) = (at(format!("car.{w}.wheel.b.R[2,2]")), -at(format!("car.{w}.wheel.b.R[1,2]")));
-        at(format!("car.{w}.tyre.Fx")) * cos - at(format!("car.{w}.tyre.Fy")) * sin
+        (at(format!("car.{w}.tyre.Fx")) * cos - at(format!("car.{w}.tyre.Fy")) * sin) / cos.hypot(sin)
     };
     ["fl", "fr", "rl", "rr"].iter().map(|w| of(w)).sum()
 }
@@ -850,4 +850,51 @@ fn the_sedan_changes_lanes() {
     close(at(105.0), 0.0, 0.1);
     let lateral = column(&done, "lateral").iter().fold(0.0f64, |most, a| most.max(a.abs()));
     assert!((4.0..8.0).contains(&lateral), "{lateral}");
+}
+
+/// The car at rest where nothing moves it, to rounding: no run settles it.
+fn at_rest(text: &str) -> Simulated {
+    let run = Run { to: 0.05, start: Start::Equilibrium, record: Record::All, ..Run::default() };
+    sedan_of(text).simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+/// Without brakes it stands on level ground, as high on its left as on its right: nothing pushes it on, or holds a wheel.
+#[test]
+fn the_sedan_has_an_equilibrium_on_level_ground() {
+    let done = at_rest(&include_str!("../../../examples/sedan/sedan.bond").replace("u0 = 20 m/s", "u0 = 0 m/s"));
+    for sample in [0, column(&done, "z").len() - 1] {
+        let at = |name: &str| column(&done, name)[sample];
+        close(["fl", "fr", "rl", "rr"].iter().map(|w| at(&format!("load_{w}"))).sum(), WEIGHT, 1e-9 * WEIGHT);
+        close(at("load_fl"), at("load_fr"), 1e-9 * WEIGHT);
+        close(at("load_rl"), at("load_rr"), 1e-9 * WEIGHT);
+        close(at("roll"), 0.0, 1e-12);
+        close(at("speed"), 0.0, 1e-12);
+        close(forward(&done, sample), 0.0, 1e-9 * WEIGHT);
+        for w in ["fl", "rr"] {
+            close(
+                at(&format!("car.{w}.tyre.law.My")),
+                at(&format!("car.{w}.tyre.Fx")) * at(&format!("car.{w}.tyre.radius")),
+                1e-6,
+            );
+        }
+    }
+}
+
+/// Braked on a slope it stands where its tyres have given way as far as they hold it, both sides alike, each by less than a
+/// hundredth of a metre.
+#[test]
+fn the_sedan_has_an_equilibrium_on_a_slope() {
+    let done = at_rest(include_str!("../../../examples/sedan/slope.bond"));
+    let pull = WEIGHT * 0.15 / f64::hypot(1.0, 0.15);
+    for sample in [0, column(&done, "x").len() - 1] {
+        let at = |name: &str| column(&done, name)[sample];
+        close(forward(&done, sample), pull, 1e-9 * WEIGHT);
+        close(at("speed"), 0.0, 1e-10);
+        assert!((-0.01..-1e-3).contains(&at("x")) && at("car.y").abs() < 1e-6, "{} {}", at("x"), at("car.y"));
+        for name in ["u", "v"] {
+            let [left, right] = ["fl", "fr"].map(|w| at(&format!("car.{w}.tyre.{name}")));
+            close(left, right, 1e-7);
+            assert!((0.0..0.01).contains(&left), "{name}: {left}");
+        }
+    }
 }

@@ -8,8 +8,9 @@
 
 use super::super::start::ConstraintResidual;
 use super::super::{Model, minimum_norm};
+use super::FEW_STATES;
+use super::open_equations::{Entry, greatest};
 use super::tangent::Tangent;
-use super::{FEW_STATES, open_equations::Entry};
 use crate::bytecode::Routine;
 use faer::Mat;
 use halfarrow_compiler::program::Op;
@@ -28,6 +29,8 @@ const HOPELESS: (usize, f64) = (4, 1e-3);
 const SHORTEST: f64 = 1e-4;
 /// Sums below this part of their terms are rounding.
 const CANCELLED: f64 = 1e-13;
+/// Shares below this of a row in a combination of rows are rounding.
+const STANDS: f64 = 1e-12;
 /// Magnitudes of states below this part of the greatest are what rounding left.
 const NOISE: f64 = 1e-14;
 
@@ -299,7 +302,8 @@ impl Model {
         Some(self.structure(leaf, t, x)?.balanced())
     }
 
-    /// Quantities by states in parts of their size, and by drives: both sides of the rows.
+    /// Quantities by states in parts of their size, and by drives: both sides of the rows. Of few states what moves the quantities
+    /// of a row that keeps nothing is left out.
     fn structure(&mut self, leaf: &Leaf, t: f64, x: &[f64]) -> Option<Tangent> {
         self.place(t, x);
         self.frame.run(&leaf.routine).ok()?;
@@ -314,16 +318,22 @@ impl Model {
                 moves.extend(state.map(|j| (i, j, values[at] * leaf.size[j])));
             }
         }
-        let all_states = leaf.rows.iter().all(|row| row.state.iter().all(Option::is_some));
-        for j in (0..x.len()).filter(|_| !all_states) {
+        let follows: Vec<bool> = leaf.rows.iter().map(|row| row.state.iter().any(Option::is_none)).collect();
+        let keeps = match follows.contains(&true) && x.len() <= FEW_STATES {
+            true => keeping(leaf.rows.len(), leaf.drives, &by)?,
+            false => follows.clone(),
+        };
+        let followers: Vec<usize> = (0..leaf.rows.len()).filter(|&i| follows[i] && keeps[i]).collect();
+        for j in (0..x.len()).filter(|_| !followers.is_empty()) {
             self.place(t, x);
             self.still();
             self.frame.d[self.code.layout.states as usize + j] = 1.0;
             self.frame.run_along(&leaf.routine).ok()?;
-            for (i, row) in leaf.rows.iter().enumerate() {
-                let followers = row.quantity.clone().step_by(2).zip(&row.state).filter(|(_, state)| state.is_none());
+            for &i in &followers {
+                let row = &leaf.rows[i];
+                let quantities = row.quantity.clone().step_by(2).zip(&row.state).filter(|(_, state)| state.is_none());
                 let slope = |at: usize| self.frame.d[leaf.routine.outputs[at + 1] as usize];
-                let moved = followers.map(|(at, _)| (i, j, values[at] * slope(at) * leaf.size[j]));
+                let moved = quantities.map(|(at, _)| (i, j, values[at] * slope(at) * leaf.size[j]));
                 moves.extend(moved.filter(|entry| entry.2 != 0.0));
             }
         }
@@ -341,12 +351,27 @@ fn kept(rows: &Tangent) -> Option<Mat<f64>> {
     if rows.drives == 0 {
         return Some(moves);
     }
-    // What the drives cannot do: combinations of rows from which all of them vanish.
-    let svd = drives.svd().ok()?;
+    let out_of_reach = out_of_reach(&drives)?;
+    let sum = |a: usize, j: usize| (0..rows.rows).map(|i| out_of_reach[(i, a)] * moves[(i, j)]).sum();
+    Some(Mat::from_fn(out_of_reach.ncols(), rows.states, sum))
+}
+
+/// What the drives cannot do: combinations of rows from which all of them vanish, column by column.
+fn out_of_reach(drives: &Mat<f64>) -> Option<Mat<f64>> {
+    let (rows, columns) = drives.shape();
+    let svd = if rows <= columns { drives.thin_svd() } else { drives.svd() }.ok()?;
     let rank = rank_of(&svd.S().column_vector().iter().copied().collect::<Vec<_>>());
-    let u = svd.U();
-    let sum = |a: usize, j: usize| (0..rows.rows).map(|i| u[(i, rank + a)] * moves[(i, j)]).sum();
-    Some(Mat::from_fn(rows.rows - rank, rows.states, sum))
+    Some(Mat::from_fn(rows, rows - rank, |i, a| svd.U()[(i, rank + a)]))
+}
+
+/// Which rows stand in a combination that no drive moves.
+fn keeping(rows: usize, drives: usize, by: &[Entry]) -> Option<Vec<bool>> {
+    let scales = greatest(rows, by.iter().map(|e| (e.0, e.2)));
+    let mut matrix = Mat::<f64>::zeros(rows, drives);
+    by.iter().for_each(|&(i, k, v)| matrix[(i, k)] += v * scales[i]);
+    let out_of_reach = out_of_reach(&matrix)?;
+    let stands = |i: usize| (0..out_of_reach.ncols()).any(|a| out_of_reach[(i, a)].abs() > STANDS);
+    Some((0..rows).map(stands).collect())
 }
 
 fn rank_of(values: &[f64]) -> usize {

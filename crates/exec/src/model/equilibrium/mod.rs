@@ -4,6 +4,7 @@
 //! are. Up to a few states they are full, and the shortest of many solutions is told by singular values.
 
 mod leaf;
+mod led;
 mod loads;
 mod open_equations;
 mod point;
@@ -13,11 +14,14 @@ mod tangent;
 use super::{EquilibriumError, Model};
 use halfarrow_sim::{Jacobian, System};
 use leaf::Leaf;
+use point::LinearisedPoint;
 use rest::Rest;
 
 const ITERATIONS: usize = 200;
 /// Up to so many states equations are full.
 const FEW_STATES: usize = 50;
+/// A rate that changes its state by less than this part of it, in the shortest time that the model knows, says nothing of a step.
+const UNSEEN: f64 = 1e-12;
 /// A constraint counts as kept if it is missed by less than this fraction of what its displacements come to.
 const KEPT: f64 = 1e-8;
 
@@ -48,6 +52,15 @@ impl LeastRates {
             (self.least, self.moving) = (size, rest.moving(rates));
         }
     }
+}
+
+/// What rates count, where one that no state changes but by rounding, as that of the first number of a quaternion at rest, does not
+/// count beyond measure.
+fn bounded_weights(weights: &[f64], leaf: Option<&Leaf>, at: &LinearisedPoint) -> Vec<f64> {
+    let Some(leaf) = leaf else { return weights.to_vec() };
+    let unseen = UNSEEN * at.fastest_pair();
+    let bounded = |(w, size): (&f64, &f64)| if w * unseen * size > 1.0 { 1.0 / (unseen * size) } else { *w };
+    weights.iter().zip(&leaf.size).map(bounded).collect()
 }
 
 impl Model {
@@ -124,13 +137,16 @@ impl Model {
         let mut pseudo_step = f64::INFINITY;
         let mut least: Option<LeastRates> = None;
         let mut rest = Rest::new(x.len());
+        // Where the shortest steps have ended.
+        let mut stuck: Option<LinearisedPoint> = None;
         let mut at = self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
         for iteration in 0..ITERATIONS {
             rest.see(&at);
-            let Some(newton) = at.newton_step() else { break };
+            let Some(newton) = at.newton_step(stuck.is_some()) else { break };
             let found = || Equilibrium { x: at.x.clone(), free: newton.free, iterations: iteration };
-            let weights = || LeastRates { weights: newton.weights.clone(), least: f64::INFINITY, moving: Vec::new() };
-            least.get_or_insert_with(weights).update(&at.rates, &rest);
+            let weights = bounded_weights(&newton.weights, leaf, &at);
+            let first = || LeastRates { weights: weights.clone(), least: f64::INFINITY, moving: Vec::new() };
+            least.get_or_insert_with(first).update(&at.rates, &rest);
             if newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs()) || rest.is_exact(&at) {
                 if rest.is_reached(&at) {
                     return Ok(found());
@@ -139,7 +155,7 @@ impl Model {
                     break;
                 }
             }
-            let norm = |r: &[f64]| r.iter().zip(&newton.weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
+            let norm = |r: &[f64]| r.iter().zip(&weights).map(|(r, w)| (r * w) * (r * w)).sum::<f64>().sqrt();
             let before = norm(&at.rates);
             let step = match pseudo_step.is_infinite() {
                 true => newton.step.clone(),
@@ -170,8 +186,15 @@ impl Model {
                 }
                 // No step comes nearer, since only rounding is left.
                 None if rest.is_reached(&at) => return Ok(found()),
+                // The shortest steps end where nothing can be done, as tyres that hold all that they can: as the motion goes, then.
+                None if pseudo_step.is_infinite() && stuck.is_none() && newton.free > 0 && x.len() <= FEW_STATES => {
+                    let start =
+                        self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
+                    stuck = Some(std::mem::replace(&mut at, start));
+                }
                 // Newton's method fails: follow the motion in pseudo-time, with a small step at first.
                 None if pseudo_step.is_infinite() => {
+                    at = stuck.take().unwrap_or(at);
                     let fastest = at.entries().fold(0.0f64, |most, (_, _, j)| most.max(j.abs()));
                     pseudo_step = if fastest > 0.0 { 0.1 / fastest } else { break };
                 }

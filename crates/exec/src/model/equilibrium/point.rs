@@ -1,10 +1,10 @@
 //! A state with what the next step of a search is made of.
 
 use super::super::{Model, minimum_norm};
-use super::FEW_STATES;
 use super::leaf::{Directions, Leaf};
 use super::open_equations::{Entry, OpenEquations, greatest};
 use super::tangent::Tangent;
+use super::{FEW_STATES, led};
 use halfarrow_sim::{Failure, Jacobian};
 
 /// Derivatives below this fraction of the greatest of their rate, or by their state, are rounding.
@@ -57,13 +57,17 @@ impl LinearisedPoint {
         (rows, columns)
     }
 
-    /// The step of Newton's method. `None` if it does not come out.
-    pub fn newton_step(&self) -> Option<NewtonStep> {
+    /// The step of Newton's method: of many the shortest, or of few states that which the motion makes. `None` if it does not
+    /// come out.
+    pub fn newton_step(&self, led: bool) -> Option<NewtonStep> {
         match &self.ways {
             Ways::Full { directions, along } => {
                 let count = directions.count(self.x.len());
-                let newton = minimum_norm::step(along, &self.rates, count)?;
+                let mut newton = minimum_norm::step(along, &self.rates, count)?;
                 let free = count - newton.rank;
+                if led && free > 0 {
+                    led::led(&self.square(directions, along), &mut newton.step)?;
+                }
                 Some(NewtonStep { step: directions.step(&newton.step), free, weights: newton.weights })
             }
             Ways::Sparse(within) => {
@@ -81,18 +85,26 @@ impl LinearisedPoint {
             Ways::Full { directions, along } => (directions, along),
             Ways::Sparse(within) => return Some(self.sparse_step(within.as_ref(), 1.0 / pseudo_step)?.0),
         };
-        let n = self.x.len();
-        let k = directions.count(n);
+        let k = directions.count(self.x.len());
         let mut lu = crate::bytecode::Lu::new(k, false);
-        for j in 0..k {
-            let column: Vec<f64> = (0..n).map(|i| along[i * k + j]).collect();
-            directions.parts(&column).iter().enumerate().for_each(|(i, a)| lu.matrix()[i * k + j] = -a);
-            lu.matrix()[j * k + j] += 1.0 / pseudo_step;
-        }
+        self.square(directions, along).into_iter().enumerate().for_each(|(at, v)| lu.matrix()[at] = -v);
+        (0..k).for_each(|j| lu.matrix()[j * k + j] += 1.0 / pseudo_step);
         lu.factor().ok()?;
         let mut step = directions.parts(&self.rates);
         lu.solve(&mut step);
         step.iter().all(|s| s.is_finite()).then(|| directions.step(&step))
+    }
+
+    /// How fast what moves along a direction moves along each: row by row.
+    fn square(&self, directions: &Directions, along: &[f64]) -> Vec<f64> {
+        let n = self.x.len();
+        let k = directions.count(n);
+        let mut square = vec![0.0; k * k];
+        for j in 0..k {
+            let column: Vec<f64> = (0..n).map(|i| along[i * k + j]).collect();
+            directions.parts(&column).into_iter().enumerate().for_each(|(i, a)| square[i * k + j] = a);
+        }
+        square
     }
 
     /// The shortest step with `(J - slowed) step = -rates`, and how many combinations of states are open.
