@@ -480,16 +480,19 @@ fn is_even(n: &Rational) -> bool {
 /// The number that `primitive` takes out.
 fn content(terms: &[(Rational, Expr)]) -> Rational {
     let leading = terms.iter().find(|t| t.1 != ONE).unwrap_or(&terms[0]);
-    let sign = Rational::from(i64::from(leading.0.signum()));
-    let size = leading.0.abs();
-    if terms.iter().all(|t| t.0.abs() == size) {
-        return &sign * &size;
+    &Rational::from(i64::from(leading.0.signum())) * &content_size(terms.iter().map(|t| &t.0))
+}
+
+/// The same without its sign, of the numbers before the terms.
+pub(super) fn content_size<'a>(numbers: impl Iterator<Item = &'a Rational> + Clone) -> Rational {
+    let size = numbers.clone().next().map_or(Rational::from(1), Rational::abs);
+    if numbers.clone().all(|n| n.abs() == size) {
+        return size;
     }
-    if !terms.iter().all(|t| t.0.is_integer()) {
-        return sign;
+    if !numbers.clone().all(Rational::is_integer) {
+        return Rational::from(1);
     }
-    let mut numerators = terms.iter().map(|t| t.0.numerator().unsigned_abs());
+    let mut numerators = numbers.map(|n| n.numerator().unsigned_abs());
     let first = numerators.next().unwrap_or(UBig::ONE);
-    let gcd = numerators.fold(first, |g, n| if n.is_zero() { g } else { g.gcd(n) });
-    &sign * &Rational::from_big(gcd.into())
+    Rational::from_big(numerators.fold(first, |g, n| if n.is_zero() { g } else { g.gcd(n) }).into())
 }

@@ -109,7 +109,11 @@ impl Polynomial {
 
     /// The greatest monomial that divides all terms.
     pub fn content(&self) -> Monomial {
-        let mut monomials = self.0.keys();
+        Polynomial::content_of(self.0.keys())
+    }
+
+    /// The greatest monomial that divides all these.
+    pub fn content_of<'a>(mut monomials: impl Iterator<Item = &'a Monomial>) -> Monomial {
         let Some(first) = monomials.next() else { return Vec::new() };
         let mut common = first.clone();
         for monomial in monomials {

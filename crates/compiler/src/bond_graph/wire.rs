@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use smallvec::{SmallVec, smallvec};
 
 use super::faults::Faults;
-use super::flatten::{At, End, Flat, Part, Word};
+use super::flatten::{At, End, Flat, Joint, Part, Word};
 use super::multibonds::Width;
 use super::scope::{Here, Names};
 use crate::diagnostic::{Diagnostic, codes};
@@ -92,6 +92,11 @@ fn slots(part: &Part<'_>) -> usize {
     }
 }
 
+/// The name of a port of a component, and what of it one of its strands is: `a` and `.v[2]`.
+fn own_name(name: &str) -> (&str, &str) {
+    name.split_at(name.find(['.', '[']).unwrap_or(name.len()))
+}
+
 impl Wiring {
     /// What is at both sides of every joint.
     fn sides(&mut self, flat: &Flat<'_>) -> Vec<Sides> {
@@ -119,9 +124,20 @@ impl Wiring {
                 }
             }
         }
+        let port = |joint: usize| (flat.joints[joint].instance, own_name(&flat.joints[joint].name).0);
+        let reached: BTreeSet<(usize, &str)> =
+            (0..sides.len()).filter(|&joint| sides[joint].outside.is_some()).map(port).collect();
+        let mut said: BTreeSet<(usize, &str)> = BTreeSet::new();
         for (joint, side) in sides.iter_mut().enumerate() {
             let before = self.faults.len();
-            self.check_joint(flat, joint, side);
+            // Where no strand of a port is connected that is said once.
+            let whole = !reached.contains(&port(joint));
+            let is_free = side.inside.is_some() && !side.broken && !flat.joints[joint].open;
+            if whole && is_free && !said.insert(port(joint)) {
+                side.broken = true;
+                continue;
+            }
+            self.check_joint(flat, joint, side, whole);
             self.met_in(flat, Here::of(flat.joints[joint].instance), before);
         }
         sides
@@ -130,10 +146,7 @@ impl Wiring {
     /// Two bonds at one side of a port of a component.
     fn crowded(&mut self, flat: &Flat<'_>, joint: usize, end: End, first: Span, outside: bool) {
         let port = &flat.joints[joint];
-        let (own, strand) = match port.name.find(['.', '[']) {
-            Some(end) => port.name.split_at(end),
-            None => (port.name.as_str(), ""),
-        };
+        let (own, strand) = own_name(&port.name);
         let title = match outside {
             true => format!("two bonds at port `{}{own}` from outside", flat.names.scopes[port.instance].prefix),
             false => format!("two bonds at port `{own}` in the component"),
@@ -150,7 +163,8 @@ impl Wiring {
         );
     }
 
-    fn check_joint(&mut self, flat: &Flat<'_>, joint: usize, sides: &mut Sides) {
+    /// `whole`: nothing is connected with the port that it is a strand of.
+    fn check_joint(&mut self, flat: &Flat<'_>, joint: usize, sides: &mut Sides, whole: bool) {
         let port = &flat.joints[joint];
         let Some((component, used)) = flat.names.scopes[port.instance].instance else { return };
         let name = &port.name;
@@ -181,13 +195,24 @@ impl Wiring {
                 );
             }
             (None, Some(_)) if port.open => {}
-            (None, Some(_)) => {
+            (None, Some((_, in_starts))) => {
                 sides.broken = true;
+                let (own, strand) = own_name(name);
+                let name = if whole { own } else { name };
+                let own_strands = |j: &Joint| j.instance == port.instance && own_name(&j.name).0 == own;
+                let free = match flat.joints.iter().filter(|j| own_strands(j)).count() {
+                    _ if strand.starts_with('.') => String::new(),
+                    count if whole && count > 1 => format!("; for a free end, join `Se[{count}]:free(0)` to it"),
+                    _ => "; for a free end, join `Se:free(0)` to it".into(),
+                };
                 let title = format!("port `{instance}.{name}` is not connected");
                 self.fault(
                     Diagnostic::error(codes::B005, title, used, "no bond ends at this port")
                         .also(port.span, "declared here")
-                        .hint(format!("write `… -> {instance}.{name}`; for a free end, join `Se:free(0)` to it")),
+                        .hint(match in_starts {
+                            true => format!("write `… -> {instance}.{name}`{free}"),
+                            false => format!("write `{instance}.{name} -> …`{free}"),
+                        }),
                 );
             }
         }

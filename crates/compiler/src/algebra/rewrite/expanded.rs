@@ -4,6 +4,7 @@ use super::super::exprs::Exprs;
 use super::super::node::{Expr, Node};
 use super::super::polynomial::{Generators, Monomial, Polynomial, expand, monomial_expr};
 use super::super::rational::Rational;
+use super::least_length::{Lengths, Term};
 
 impl Exprs {
     /// The expression multiplied out; itself if that takes too many terms.
@@ -32,17 +33,38 @@ impl Exprs {
         }
     }
 
-    /// Multiplied out, and with common factors taken out of that.
+    /// Multiplied out, and with common factors taken out of that, where that is shorter.
     pub(super) fn expanded_forms(&mut self, e: Expr, forms: &mut Vec<Expr>, work: &mut u64) {
         let mut generators = Generators::within(self.search_left());
         if let Some(polynomial) = expand(self, e, &mut generators) {
             let polynomial = polynomial.tidy(self, &generators);
             let polynomial = self.reduce_trigonometric(polynomial, &mut generators);
-            forms.push(polynomial.to_expr(self, &generators));
-            forms.push(self.factored(&polynomial, &generators));
-            forms.extend(self.grouped(&polynomial, &mut generators));
+            let lengths = self.lengths(&generators);
+            let mut shortest = self.written_length(e);
+            if lengths.of_sum(&polynomial) < shortest {
+                let form = polynomial.to_expr(self, &generators);
+                shortest = shortest.min(self.checked_length(form, lengths.of_sum(&polynomial)));
+                forms.push(form);
+            }
+            if lengths.of_factored(&polynomial) < shortest {
+                let form = self.factored(&polynomial, &generators);
+                shortest = shortest.min(self.checked_length(form, lengths.of_factored(&polynomial)));
+                forms.push(form);
+            }
+            forms.extend(self.grouped(&polynomial, &mut generators, &lengths, shortest));
         }
         *work += generators.work;
+    }
+
+    /// How long a form is, which was told to be no shorter than this.
+    fn checked_length(&self, form: Expr, least: u64) -> u64 {
+        let length = self.written_length(form);
+        debug_assert!(
+            length >= least,
+            "a form of length {length} was to be no shorter than {least}: {}",
+            super::super::ascii(self, form, &super::super::PlainNames(self))
+        );
+        length
     }
 
     /// Common factors in front of the sum.
@@ -54,27 +76,39 @@ impl Exprs {
     }
 
     /// The sum split by whether a generator stands in the term, and common factors taken out of both halves: for the
-    /// generator for which that is shortest.
-    fn grouped(&mut self, polynomial: &Polynomial, generators: &mut Generators) -> Option<Expr> {
+    /// generator for which that is shortest, if it is shorter than this.
+    fn grouped(
+        &mut self,
+        polynomial: &Polynomial,
+        generators: &mut Generators,
+        lengths: &Lengths,
+        mut shortest: u64,
+    ) -> Option<Expr> {
         if polynomial.0.len() < 3 || polynomial.0.len() > 24 {
             return None;
         }
-        let mut best: Option<(u64, Expr)> = None;
+        let mut best = None;
         for i in 0..generators.list.len() {
             generators.work += 4 * polynomial.0.len() as u64;
             let holds = |m: &Monomial| m.get(i).is_some_and(|&n| n != 0);
-            let (with, without): (Vec<_>, Vec<_>) = polynomial.0.clone().into_iter().partition(|(m, _)| holds(m));
+            let (with, without): (Vec<Term>, Vec<Term>) = polynomial.0.iter().partition(|(m, _)| holds(m));
             if with.len() < 2 || without.is_empty() {
                 continue;
             }
-            let halves = [with, without].map(|half| Polynomial(half.into_iter().collect()));
-            let parts = [self.factored(&halves[0], generators), self.factored(&halves[1], generators)];
+            let least = lengths.of_halves([&with, &without]);
+            if least >= shortest {
+                continue;
+            }
+            let parts = [with, without].map(|half| {
+                let half = half.into_iter().map(|(m, c)| (m.clone(), c.clone()));
+                self.factored(&Polynomial(half.collect()), generators)
+            });
             let sum = self.add(&parts);
-            let length = self.written_length(sum);
-            if best.is_none_or(|b| length < b.0) {
-                best = Some((length, sum));
+            let length = self.checked_length(sum, least);
+            if length < shortest {
+                (shortest, best) = (length, Some(sum));
             }
         }
-        best.map(|b| b.1)
+        best
     }
 }

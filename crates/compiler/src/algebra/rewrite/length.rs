@@ -91,7 +91,7 @@ impl Exprs {
     }
 
     /// Whether a term of the sum has a denominator.
-    fn holds_fraction(&self, sum: Expr) -> bool {
+    pub(super) fn holds_fraction(&self, sum: Expr) -> bool {
         let Node::Add(terms) = self.node(sum) else { return false };
         terms.iter().any(|t| match self.node(*t) {
             Node::Mul(factors) => factors.iter().any(|f| self.divides(*f)),

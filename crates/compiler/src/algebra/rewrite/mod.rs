@@ -4,6 +4,7 @@
 mod expanded;
 mod factor;
 mod flat;
+mod least_length;
 mod length;
 mod nested;
 mod trigonometric;
