@@ -239,15 +239,31 @@ impl<'a> Flat<'a> {
                 self.names.scopes[inner].nodes.get(port.name.text.as_str()).map(|(node, _)| *node)
             }
             (_, ports) => {
-                let list: Vec<&str> = ports.iter().map(|p| p.name.text.as_str()).collect();
+                let names = |list: &'a [ast::Declaration]| list.iter().map(|d| d.name.text.as_str());
+                let [taken, given] = [&component.ins, &component.outs].map(|list| {
+                    let with_signals = list.iter().filter(|d| self.kind_of_port(d).is_some());
+                    with_signals.map(|d| d.name.text.as_str()).collect::<Vec<&str>>()
+                });
+                let list: Vec<&str> = names(ports).chain(taken.iter().copied()).chain(given.iter().copied()).collect();
                 let title = format!("which port of `{}`?", component.name.text);
                 let name = self.names.scopes[inner].prefix.clone();
                 let d = Diagnostic::error(codes::B009, title, span, "a bond ends at a port");
-                self.faults.push(match list.first() {
-                    Some(first) => d
+                let here = names(ports).next().or_else(|| if pointed_at { &taken } else { &given }.first().copied());
+                self.faults.push(match (here, list.first()) {
+                    (Some(port), _) => d
                         .note(format!("its ports are {}", list.join(", ")))
-                        .hint(format!("declare it on a line of its own and write `{name}{first}` here")),
-                    None => d.note("it has no ports"),
+                        .hint(format!("declare it on a line of its own and write `{name}{port}` here")),
+                    // Half arrows of frames run from the ground outward, one way only.
+                    (None, Some(_)) => d.note(format!("its ports are {}", list.join(", "))).hint(match taken.last() {
+                        Some(port) => {
+                            format!("half arrows point at its ports: write `… -> {name}{port}` on a line of its own")
+                        }
+                        None => format!(
+                            "half arrows start at its ports: write `{name}{} -> …` on a line of its own",
+                            list[0]
+                        ),
+                    }),
+                    (None, None) => d.note("it has no ports"),
                 });
                 None
             }
