@@ -200,9 +200,12 @@ impl Wiring {
                 let (own, strand) = own_name(name);
                 let name = if whole { own } else { name };
                 let own_strands = |j: &Joint| j.instance == port.instance && own_name(&j.name).0 == own;
-                let free = match flat.joints.iter().filter(|j| own_strands(j)).count() {
-                    _ if strand.starts_with('.') => String::new(),
-                    count if whole && count > 1 => format!("; for a free end, join `Se[{count}]:free(0)` to it"),
+                let free = match strand.chars().next() {
+                    Some('.') => String::new(),
+                    Some(_) if whole => {
+                        let count = flat.joints.iter().filter(|j| own_strands(j)).count();
+                        format!("; for a free end, join `Se[{count}]:free(0)` to it")
+                    }
                     _ => "; for a free end, join `Se:free(0)` to it".into(),
                 };
                 let title = format!("port `{instance}.{name}` is not connected");

@@ -41,14 +41,16 @@ impl Exprs {
             let polynomial = self.reduce_trigonometric(polynomial, &mut generators);
             let lengths = self.lengths(&generators);
             let mut shortest = self.written_length(e);
-            if lengths.of_sum(&polynomial) < shortest {
+            let least = lengths.of_sum(&polynomial);
+            if least < shortest {
                 let form = polynomial.to_expr(self, &generators);
-                shortest = shortest.min(self.checked_length(form, lengths.of_sum(&polynomial)));
+                shortest = shortest.min(self.checked_length(form, least));
                 forms.push(form);
             }
-            if lengths.of_factored(&polynomial) < shortest {
+            let least = lengths.of_factored(&polynomial);
+            if least < shortest {
                 let form = self.factored(&polynomial, &generators);
-                shortest = shortest.min(self.checked_length(form, lengths.of_factored(&polynomial)));
+                shortest = shortest.min(self.checked_length(form, least));
                 forms.push(form);
             }
             forms.extend(self.grouped(&polynomial, &mut generators, &lengths, shortest));

@@ -348,9 +348,6 @@ fn kept(rows: &Tangent) -> Option<Mat<f64>> {
     let mut drives = Mat::<f64>::zeros(rows.rows, rows.drives);
     rows.moves.iter().for_each(|&(i, j, v)| moves[(i, j)] += v);
     rows.by.iter().for_each(|&(i, k, v)| drives[(i, k)] += v);
-    if rows.drives == 0 {
-        return Some(moves);
-    }
     let out_of_reach = out_of_reach(&drives)?;
     let sum = |a: usize, j: usize| (0..rows.rows).map(|i| out_of_reach[(i, a)] * moves[(i, j)]).sum();
     Some(Mat::from_fn(out_of_reach.ncols(), rows.states, sum))
@@ -359,6 +356,9 @@ fn kept(rows: &Tangent) -> Option<Mat<f64>> {
 /// What the drives cannot do: combinations of rows from which all of them vanish, column by column.
 fn out_of_reach(drives: &Mat<f64>) -> Option<Mat<f64>> {
     let (rows, columns) = drives.shape();
+    if columns == 0 {
+        return Some(Mat::identity(rows, rows));
+    }
     let svd = if rows <= columns { drives.thin_svd() } else { drives.svd() }.ok()?;
     let rank = rank_of(&svd.S().column_vector().iter().copied().collect::<Vec<_>>());
     Some(Mat::from_fn(rows, rows - rank, |i, a| svd.U()[(i, rank + a)]))
