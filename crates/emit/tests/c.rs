@@ -95,6 +95,23 @@ fn c_goes_on_with_what_steps_found_at_their_end() {
     check("ahead", &all, &text, |one| one.step_with(STEPS, |model, i| model.set_input(0, torque(i))));
 }
 
+/// Columns of a Jacobian that is found by comparing rates are computed from what these have in common, at once and in the course of
+/// steps, while the rack moves the loops of the car.
+#[test]
+fn c_compares_rates_in_parts() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/iltis");
+    let text = std::fs::read_to_string(folder.join("flat.bond")).expect("a model").replace("model Flat", "model Bends");
+    let (input, import) = ("input rack = 0 m", "import \"car.bond\"");
+    assert!(text.contains(input) && text.contains(import));
+    let text = text.replace(input, "let rack = 0.005*(1 + sign(t - 0.031)) + 0.01*sin(20*t)");
+    let text = text.replace(import, &format!("import \"{}\"", folder.join("car.bond").display()));
+    let path = common::folder("parts_models").join("bends.bond");
+    std::fs::write(&path, text).expect("a model");
+    let all = [export(&path, Method::LinearlyImplicitBdf2, 1e-3)];
+    assert!(all[0].written.source.contains("return ha_rates_part_0(m, t, x, out);"));
+    check("parts", &all, &driver(&all, &|_| (-1, 0.0)), |one| one.simulate(STEPS));
+}
+
 /// What fails is said with the elements concerned, where the interpreter stops.
 #[test]
 fn c_says_what_fails() {

@@ -15,7 +15,6 @@
 #[macro_use]
 mod op;
 
-mod ahead;
 mod angles;
 mod bounds;
 pub mod calculus;
@@ -31,6 +30,7 @@ mod kept;
 mod lower;
 mod nearness;
 mod operations;
+mod parts;
 mod print;
 mod ratios;
 mod repetition;
@@ -43,11 +43,11 @@ mod triggers;
 mod values;
 mod verify;
 
-pub use ahead::RatesAhead;
 pub use bounds::{Bounds, Margin};
 pub use events::{Action, Bound, Clause, Impulse, Jumps, Measure, SetValued, Target, Trigger};
 pub use jacobian::{Differentiated, JacobianEntry};
 pub use op::{Bits, Cost, Op};
+pub use parts::RatesInParts;
 pub use ratios::{Ratios, Told};
 pub use repetition::Repetition;
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};

@@ -42,14 +42,23 @@ impl OperationCount {
     /// What code does.
     pub fn of(program: &Program, code: &Code) -> OperationCount {
         let mut work = OperationCount::default();
-        for step in &code.steps {
-            match step {
-                Step::Op { op, .. } => work.count(*op),
-                Step::Parameter { .. } | Step::Guard { .. } => work.operations += 1,
-                Step::Solve(solve) => work.solve(program, solve),
-            }
-        }
+        code.steps.iter().for_each(|step| work.step(program, step));
         work
+    }
+
+    /// What a step does.
+    pub fn of_step(program: &Program, step: &Step) -> OperationCount {
+        let mut work = OperationCount::default();
+        work.step(program, step);
+        work
+    }
+
+    fn step(&mut self, program: &Program, step: &Step) {
+        match step {
+            Step::Op { op, .. } => self.count(*op),
+            Step::Parameter { .. } | Step::Guard { .. } => self.operations += 1,
+            Step::Solve(solve) => self.solve(program, solve),
+        }
     }
 
     /// Operations of all kinds, without those of Newton blocks.
@@ -93,7 +102,7 @@ impl OperationCount {
     }
 
     /// All operations, if each Newton block takes so many evaluations.
-    fn total(&self, evaluations: u64) -> u64 {
+    pub fn total(&self, evaluations: u64) -> u64 {
         let newton: u64 = self.newton.iter().map(|(_, times, one)| times * one * evaluations).sum();
         self.operations + self.divisions + self.calls + newton
     }

@@ -119,6 +119,10 @@ flags! {
     shows_ahead
     /// and it reads Newton blocks.
     ahead_newton
+    /// What rates beside a state have in common is computed once,
+    knows_common
+    /// and it reads Newton blocks.
+    common_newton
     /// Something that may jump with an input is looked at where one jumps.
     inputs_jump
     time_passes

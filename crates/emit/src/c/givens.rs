@@ -20,8 +20,8 @@ pub(super) struct Givens<'a> {
     derived: FxHashMap<Value, usize>,
     /// The place in `m->positions` of each that is given at the start.
     positions: FxHashMap<Value, usize>,
-    /// The place in `m->ahead` of each that was found where a step ended; only while code is written that begins with them.
-    pub ahead: FxHashMap<Value, usize>,
+    /// The place of each that was found before; only while code is written that begins with them.
+    pub found: FxHashMap<Value, Place>,
     /// The place of each of them that is read in double precision.
     exact: RefCell<FxHashMap<Value, usize>>,
 }
@@ -32,8 +32,8 @@ impl<'a> Givens<'a> {
         let computed = determined.iter().filter(|v| !program.values.op(**v).is_given());
         let derived = computed.enumerate().map(|(place, &v)| (v, place)).collect();
         let positions = program.positions.iter().enumerate().map(|(k, p)| (p.value, k)).collect();
-        let (ahead, exact) = (FxHashMap::default(), RefCell::default());
-        Givens { program, real, derived, positions, ahead, exact }
+        let (found, exact) = (FxHashMap::default(), RefCell::default());
+        Givens { program, real, derived, positions, found, exact }
     }
 
     /// How many values are computed from parameters.
@@ -76,8 +76,8 @@ impl<'a> Givens<'a> {
     /// Where a value stands.
     pub fn spot(&self, value: Value) -> Spot {
         let place = |array, index| Spot::Place(Place { array, index });
-        if let Some(&index) = self.ahead.get(&value) {
-            return place("m->ahead", index);
+        if let Some(&place) = self.found.get(&value) {
+            return Spot::Place(place);
         }
         match self.program.values.op(value) {
             Op::Constant(bits) => Spot::Number(bits.number()),

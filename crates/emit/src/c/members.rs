@@ -413,6 +413,11 @@ fn of_kept_steps(list: &mut List, plan: &Plan) {
     if plan.compares_rates() {
         list.arrays(Kind::Real, &["rates_at"], nx, "");
     }
+    if let Some(beside) = &plan.beside {
+        list.arrays(Kind::Real, &["common"], beside.size(), "the rates there, and what those beside it have in common");
+        list.arrays(Kind::Real, &["rates_room"], beside.size(), "the same at any state");
+        list.one(Kind::Int, &["common_known"], "whether that is known");
+    }
     if plan.groups_a_step().is_some() {
         list.arrays(Kind::Real, &["next_jacobian"], nonzeros, "the Jacobian that is to follow");
         list.arrays(Kind::Real, &["next_at"], nx, "the state at which it is found");

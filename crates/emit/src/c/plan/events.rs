@@ -151,11 +151,18 @@ pub(super) fn code_of(clause: usize) -> String {
 
 /// The cases of the function that calls it.
 pub(super) fn cases(program: &Program) -> Written {
+    cases_of(
+        program.clauses.iter().enumerate().map(|(i, clause)| (format!(" /* {} */", comment(&clause.name)), code_of(i))),
+    )
+}
+
+/// The cases of a function that calls code by its number, each with a comment.
+pub(super) fn cases_of(codes: impl Iterator<Item = (String, String)>) -> Written {
     let mut notes = Notes::default();
     let mut text = String::new();
-    for (i, clause) in program.clauses.iter().enumerate() {
-        let (name, code) = (comment(&clause.name), Needed(code_of(i).into()));
-        let case = written!("    case {}: /* {} */\n        return {}(m, t, x, out);\n", i, name, code);
+    for (i, (about, code)) in codes.enumerate() {
+        let code = Needed(code.into());
+        let case = written!("    case {}:{}\n        return {}(m, t, x, out);\n", i, about, code);
         case.note(&mut notes);
         text += &case.text;
     }

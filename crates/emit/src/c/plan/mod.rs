@@ -1,5 +1,6 @@
 //! All functions of a model, and the source that they make.
 
+mod beside;
 mod checks;
 mod events;
 mod modes;
@@ -24,6 +25,8 @@ use super::patterns::Patterns;
 use super::start::{self, Group, Pass};
 use super::write::{Moving, Place, Shape, TimeRate, Writer};
 use crate::EmitError;
+pub(super) use beside::Beside;
+use beside::BesideRoutines;
 pub(super) use events::EventTables;
 pub(super) use modes::{ModeTables, Modes};
 pub(super) use routines::Ahead;
@@ -76,6 +79,8 @@ pub(super) struct Plan<'a> {
     inputs_jump: bool,
     /// What is found where a step ends, if that saves much.
     pub ahead: Option<Ahead>,
+    /// What rates beside a state have in common, if that saves much.
+    pub beside: Option<Beside>,
     /// What the sizes of arrays in the model are.
     pub sizes: Sizes,
     passes: Vec<Pass>,
@@ -163,6 +168,7 @@ impl<'a> Plan<'a> {
             motion_of_rates: 0,
             inputs_jump: program.inputs_jump(),
             ahead: None,
+            beside: None,
             sizes: Sizes::default(),
             passes: Vec::new(),
             groups: Vec::new(),
@@ -205,7 +211,18 @@ impl<'a> Plan<'a> {
             let n = routine.code.outputs.len();
             writer.function(name, PLAIN, (&routine.code, &[]), (&Place::first("out", n), &[]))
         };
-        functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates));
+        match Beside::of(self, &routines.rates) {
+            None => functions.extend(plain(&mut writer, "ha_rates_code", &routines.rates)),
+            Some((beside, BesideRoutines { common, parts })) => {
+                functions.extend(plain(&mut writer, "ha_common_code", &common));
+                writer.givens.found = beside.places().collect();
+                for (part, routine) in parts.iter().enumerate() {
+                    functions.extend(plain(&mut writer, &beside::code_of(part), routine));
+                }
+                writer.givens.found.clear();
+                self.beside = Some(beside);
+            }
+        }
         functions.extend(plain(&mut writer, "ha_observe_code", &routines.observe));
         functions.extend(plain(&mut writer, "ha_solutions_code", &routines.solutions));
         functions.extend(plain(&mut writer, "ha_motion_code", &routines.motion));
@@ -213,9 +230,9 @@ impl<'a> Plan<'a> {
         functions.extend(plain(&mut writer, "ha_switching_code", &routines.switching));
         if let Some((ahead, [found, rest])) = &routines.ahead {
             functions.extend(plain(&mut writer, "ha_ahead_code", found));
-            writer.givens.ahead = ahead.places().collect();
+            writer.givens.found = ahead.places().collect();
             functions.extend(plain(&mut writer, "ha_rates_ahead_code", rest));
-            writer.givens.ahead.clear();
+            writer.givens.found.clear();
             self.ahead = Some(ahead.clone());
         }
         functions.extend(plain(&mut writer, "ha_domains_code", &routines.domains));

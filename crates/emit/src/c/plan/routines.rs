@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::program::{
-    Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, RatesAhead, Routine, Solve, Value,
+    Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, RatesInParts, Routine, Solve, Value,
 };
 
 use super::{ModeTables, Plan};
 use crate::Real;
 use crate::c::cost::OperationCount;
+use crate::c::write::Place;
 
 /// Operations that are to be saved at each step where code is written twice for it.
 const LEAST_SAVED: u64 = 300;
@@ -36,8 +37,9 @@ impl Ahead {
     }
 
     /// Where what rates read stands.
-    pub fn places(&self) -> impl Iterator<Item = (Value, usize)> + '_ {
-        self.known.iter().copied().zip(self.seen + self.shown..)
+    pub fn places(&self) -> impl Iterator<Item = (Value, Place)> + '_ {
+        let places = (self.seen + self.shown..).map(|index| Place { array: "m->ahead", index });
+        self.known.iter().copied().zip(places)
     }
 }
 
@@ -151,7 +153,7 @@ impl Routines {
         let own = |block: BlockId| !newton_of(&self.rates.code).any(|solve| solve.block == block);
         let shown = !newton_of(&self.observe.code).any(|solve| own(solve.block));
         let shown = if shown { &self.observe.wanted[..] } else { &[] };
-        let RatesAhead { known, rest } = p.rates_ahead();
+        let RatesInParts { known, rest } = p.rates_ahead();
         let [operands, motions] = [&self.switching, &self.motion].map(|routine| &routine.wanted[..]);
         let ahead = p.guarded_routine(&[operands, motions, shown, &known].concat());
         let work = |routine: &Routine| OperationCount::of(p, &routine.code).own();

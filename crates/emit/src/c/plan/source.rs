@@ -194,6 +194,8 @@ impl Plan<'_> {
             moves_ahead: self.ahead.is_some() && self.motion_of_rates > 0,
             shows_ahead: self.ahead.as_ref().is_some_and(|ahead| ahead.shown > 0),
             ahead_newton: self.ahead.as_ref().is_some_and(|ahead| !ahead.blocks.is_empty()),
+            knows_common: self.beside.is_some(),
+            common_newton: self.beside.as_ref().is_some_and(|beside| !beside.blocks.is_empty()),
             inputs_jump: self.inputs_jump,
             time_passes: time_derivative || held || bounds.is_some() || !self.events.returning.is_empty(),
             moves: !p.clauses.is_empty() || mode.is_some(),

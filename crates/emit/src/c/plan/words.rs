@@ -9,7 +9,7 @@ use super::super::patterns::FULL_AT_MOST;
 use super::super::start::Group;
 use super::super::template::Words;
 use super::super::written::{Needed, Notes, Part, Written, written};
-use super::{Ahead, Plan};
+use super::{Ahead, Beside, Plan};
 use crate::{Method, Real};
 
 impl Plan<'_> {
@@ -35,12 +35,14 @@ impl Plan<'_> {
         };
         let distances: Vec<f64> =
             std::iter::once(0.0).chain((-240..=240).map(|k| math::pow(10.0, f64::from(k) / 20.0))).collect();
+        let beside = self.beside.as_ref();
         let groups = self.column_groups();
         let lengths = |lists: &[Vec<usize>]| {
             let mut starts = vec![0];
             lists.iter().for_each(|list| starts.push(starts[starts.len() - 1] + list.len()));
             starts.iter().map(usize::to_string).collect::<Vec<_>>()
         };
+        let part_number = |part: &Option<usize>| part.map_or("-1".to_string(), |part| part.to_string());
         let flat = |lists: &[Vec<usize>]| lists.iter().flatten().map(usize::to_string).collect::<Vec<_>>();
         let columns = self.columns();
         let real = self.export.real;
@@ -96,6 +98,10 @@ impl Plan<'_> {
             ("AHEAD_SHOWN", self.ahead.as_ref().map_or(0, Ahead::shown_from).to_string()),
             ("AHEAD_BLOCKS", join(block_numbers(self.ahead.as_ref().map_or(&[][..], |ahead| &ahead.blocks)))),
             ("AHEAD_BLOCK_COUNT", self.ahead.as_ref().map_or(0, |ahead| ahead.blocks.len()).to_string()),
+            ("GROUP_PARTS", lines(beside.map_or_else(Vec::new, |b| b.parts.iter().map(part_number).collect()))),
+            ("COMMON", beside.map_or(0, Beside::size).to_string()),
+            ("COMMON_BLOCKS", join(block_numbers(beside.map_or(&[][..], |b| &b.blocks)))),
+            ("COMMON_BLOCK_COUNT", beside.map_or(0, |b| b.blocks.len()).to_string()),
             ("GROUPS_A_STEP", self.groups_a_step().unwrap_or(groups.len()).to_string()),
             ("NONZEROS", columns.iter().map(Vec::len).sum::<usize>().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),
@@ -151,6 +157,7 @@ impl Plan<'_> {
             ("BLOCK_TABLE", self.block_table()),
             ("START_TABLES", self.start_tables()),
             ("CLAUSE_CASES", super::events::cases(program)),
+            ("PART_CASES", beside.map_or_else(|| Written::of(""), Beside::cases)),
         ];
         words
             .into_iter()

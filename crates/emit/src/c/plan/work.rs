@@ -63,7 +63,7 @@ impl Plan<'_> {
                 let nonzeros = self.columns().iter().map(|rows| rows.len() as u64).sum::<u64>();
                 let parts = self.column_groups().len() as u64 + 2;
                 let mut all = match self.compares_rates() {
-                    true => w.rates.clone() * (parts + 2),
+                    true => w.rates.clone() * (parts + 2 + u64::from(self.beside.is_some())),
                     false => w.rates.clone() * 2 + w.directional.clone() * parts,
                 };
                 all.operations += 2 * self.step_elimination(3) + 8 * nonzeros + 60 * n;

@@ -49,6 +49,75 @@ static $real ha_beside(const ha_model *m, $real h, int i)
 }
 
 //end
+//if knows_common
+//item ha_find_common
+/* Computes the rates at m->at, and what those beside it have in common. It is known where all of that is a number, and what it is
+ * solved from is no other solution where it is sought again. */
+static void ha_find_common(ha_model *m, double t)
+{
+    int status;
+    int i;
+    m->common_known = 0;
+//if assumptions
+    if (m->broken) {
+        return;
+    }
+//end
+//if held
+    $ha_place(m, t);
+//end
+    status = $ha_common_code(m, t, m->at, m->common);
+    m->common_known = status == $MODEL_OK && $ha_all_finite(m->common, $COMMON);
+    m->failure.code = $MODEL_OK;
+//if common_newton
+    {
+        static const int blocks[] = {$COMMON_BLOCKS};
+        for (i = 0; i < $COMMON_BLOCK_COUNT; ++i) {
+            m->common_known = m->common_known && m->fresh[blocks[i]];
+        }
+    }
+//end
+    (void)i;
+}
+
+//item ha_part_code
+/* The rates at a state beside m->at, where others of its numbers than those of a part are the same. */
+static int ha_part_code(ha_model *m, int part, double t, const $real *x, $real *out)
+{
+    switch (part) {
+$PART_CASES
+    default:
+        return $MODEL_OK;
+    }
+}
+
+//item ha_group_parts
+/* The part by which rates are computed of each group of columns; -1 where nearly all of them is another one. */
+static const int ha_group_parts[] = {
+$GROUP_PARTS
+};
+
+//end
+//if compares_rates
+//item ha_rates_beside
+/* The rates at m->point, where numbers of a group of columns are others than at m->at: in m->product. */
+static int ha_rates_beside(ha_model *m, double t, int group)
+{
+//if knows_common
+    const int part = $ha_group_parts[group];
+    if (m->common_known && part >= 0) {
+        if ($ha_part_code(m, part, t, m->point, m->product) == $MODEL_OK && $ha_all_finite(m->product, HA_NX)) {
+            return $MODEL_OK;
+        }
+        m->failure.code = $MODEL_OK;
+    }
+//else
+    (void)group;
+//end
+    return $model_rates(m, t, m->point, m->product);
+}
+
+//end
 //item ha_find_columns
 /* Finds a group of columns of the Jacobian at m->at. Whether there were derivatives, or rates beside it. */
 static int ha_find_columns(ha_model *m, double t, $real h, int group, $real *values)
@@ -64,7 +133,7 @@ static int ha_find_columns(ha_model *m, double t, $real h, int group, $real *val
         /* Away from zero, so that what is the mirror image of something is compared on its mirror image. */
         m->point[column] += m->at[column] < $0.0 ? -beside : beside;
     }
-    status = $model_rates(m, t, m->point, m->product);
+    status = $ha_rates_beside(m, t, group);
 //else
     (void)h;
     $ha_fill(m->point, $0.0, HA_NX);
@@ -167,6 +236,9 @@ static void ha_find_all(ha_model *m, double t, $real h, const $real *x)
 //if compares_rates
     $ha_copy(m->rates_at, m->last_rates, HA_NX);
 //end
+//if knows_common
+    $ha_find_common(m, t);
+//end
     for (group = 0; group < $GROUPS; ++group) {
         (void)$ha_find_columns(m, t, h, group, m->jacobian);
     }
@@ -189,6 +261,25 @@ static void ha_want_next(ha_model *m, const $real *x)
     }
 }
 
+//if compares_rates
+//item ha_find_rates_at
+/* Computes the rates at m->at. Whether there are any. */
+static int ha_find_rates_at(ha_model *m, double t)
+{
+//if knows_common
+    if (m->common_known) {
+        $ha_copy(m->rates_at, m->common, HA_NX);
+        return 1;
+    }
+//end
+    if ($model_rates(m, t, m->at, m->rates_at) != $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
+        return 0;
+    }
+    return 1;
+}
+
+//end
 //item ha_find_some
 /* Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole. */
 static void ha_find_some(ha_model *m, double t, $real h)
@@ -197,9 +288,11 @@ static void ha_find_some(ha_model *m, double t, $real h)
     const int end = begin + $GROUPS_A_STEP < $GROUPS ? begin + $GROUPS_A_STEP : $GROUPS;
     int group;
     $ha_copy(m->at, m->next_at, HA_NX);
+//if knows_common
+    $ha_find_common(m, t);
+//end
 //if compares_rates
-    if ($model_rates(m, t, m->at, m->rates_at) != $MODEL_OK) {
-        m->failure.code = $MODEL_OK;
+    if (!$ha_find_rates_at(m, t)) {
         m->next_groups = 0;
         return;
     }

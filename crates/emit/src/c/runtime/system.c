@@ -167,7 +167,12 @@ int $model_rates($model *m, double t, const $real *x, $real *dx)
         m->failure.code = $MODEL_OK;
     }
 //end
+//if knows_common
+    status = $ha_run(m, $ha_common_code, t, x, m->rates_room, HA_NX);
+    $ha_copy(dx, m->rates_room, HA_NX);
+//else
     status = $ha_run(m, $ha_rates_code, t, x, dx, HA_NX);
+//end
     if (status != $MODEL_OK) {
         return status;
     }

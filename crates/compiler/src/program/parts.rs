@@ -1,25 +1,31 @@
-//! Rates in two parts: what is known as soon as a state is, and what inputs add.
+//! Rates in two parts: what inputs, or some of the states, do not move, and what they do.
 
 use super::op::Op;
 use super::values::Reads;
 use super::{Block, Program, Routine, Value};
 use crate::ids::Id;
 
-/// The rates, where all is there that no input moves.
+/// The rates, where all is there that something does not move.
 #[derive(Debug, Clone)]
-pub struct RatesAhead {
-    /// What they read that no input moves, and that more than parameters determine: it holds as long as time, states, held
-    /// signals and constants do.
+pub struct RatesInParts {
+    /// What they read that does not move, and that more than parameters determine.
     pub known: Vec<Value>,
-    /// What computes them from these; the known values are [givens](super::Arg::Given) in it. Divisors that inputs move are
-    /// guarded.
+    /// What computes them from these; the known values are [givens](super::Arg::Given) in it. Divisors that move are guarded.
     pub rest: Routine,
 }
 
 impl Program {
-    /// The rates in two parts.
-    pub fn rates_ahead(&self) -> RatesAhead {
-        let moves = self.moved_by_inputs();
+    /// The rates in two parts: what no input moves is known as soon as time, states, held signals and constants are.
+    pub fn rates_ahead(&self) -> RatesInParts {
+        self.rates_moved(&self.moved_by_inputs())
+    }
+
+    /// The rates in two parts: beside a state, where only these of its numbers are others, the first part holds.
+    pub fn rates_beside(&self, states: &[usize]) -> RatesInParts {
+        self.rates_moved(&self.moved_by_states(states))
+    }
+
+    fn rates_moved(&self, moves: &[bool]) -> RatesInParts {
         let moved = |v: Value| moves[v.index()];
         let guards = self.watches_of(false).into_iter().filter(|&guard| {
             let guard = &self.pivot_guards[guard as usize];
@@ -29,17 +35,28 @@ impl Program {
         let rates: Vec<Value> = self.states.iter().map(|s| s.rate).collect();
         let guarded = guards.iter().map(|&guard| &self.pivot_guards[guard as usize]);
         let roots: Vec<Value> = rates.iter().copied().chain(guarded.flat_map(|g| [g.pivot, g.scale])).collect();
-        let known = self.known_of(&roots, &moves);
+        let known = self.known_of(&roots, moves);
         let rest = self.routine_given(&rates, &known, &guards);
-        RatesAhead { known, rest }
+        RatesInParts { known, rest }
     }
 
     /// Whether an input moves it, of each value.
     fn moved_by_inputs(&self) -> Vec<bool> {
+        self.moved_by(|op| matches!(op, Op::Input(_)))
+    }
+
+    /// Whether one of these states moves it, of each value.
+    pub fn moved_by_states(&self, states: &[usize]) -> Vec<bool> {
+        let mut among = vec![false; self.states.len()];
+        states.iter().for_each(|&state| among[state] = true);
+        self.moved_by(|op| matches!(op, Op::State(state) if among[state as usize]))
+    }
+
+    fn moved_by(&self, moves: impl Fn(Op) -> bool) -> Vec<bool> {
         let mut moved = vec![false; self.values.len()];
         for (value, op) in self.values.iter() {
             moved[value.index()] = match op {
-                Op::Input(_) => true,
+                _ if moves(op) => true,
                 Op::Solution(block, _) => self.blocks[block].reads().any(|v| moved[v.index()]),
                 _ => {
                     let mut any = false;
