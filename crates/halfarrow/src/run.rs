@@ -335,11 +335,12 @@ impl Model {
         let begun = Moment::now();
         let Begun { start, options, by, notes } = self.begin_explicit(&mut system, run)?;
         timings.start = begun.elapsed().as_secs_f64();
-        let steps_over = matches!(options.method, Method::Fixed(method) if method.is_implicit());
+        let steps_over = matches!(options.method, Method::Fixed(_));
         let again = steps_over.then(|| (system.clone(), start.clone()));
         let mut done =
             self.integrate(&mut system, start, (&options, run.execution, &by), (notes, None), &mut *progress)?;
-        if let Some((mut system, start)) = again.filter(|_| done.report.audit.open > OPEN) {
+        let doubtful = done.report.audit.open > OPEN && !done.report.audit.is_beyond(&Made::by(run));
+        if let Some((mut system, start)) = again.filter(|_| doubtful) {
             let options = Options { step: options.step.map(|step| 0.5 * step), ..options };
             let halved =
                 self.integrate(&mut system, start, (&options, run.execution, &by), (Vec::new(), None), progress);

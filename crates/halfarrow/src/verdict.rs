@@ -31,8 +31,8 @@ const ESTIMATED: f64 = 4.0;
 /// itself: what turns within a step looks like a miss.
 const COARSE: f64 = 0.05;
 
-/// Samples of implicit steps of fixed length that leave more open than this may hide an error: what decays within a step leaves as
-/// much. A run by half the step tells.
+/// Samples of steps of fixed length that leave more open than this may hide an error: what decays within a step, or comes and goes,
+/// leaves as much. A run by half the step tells.
 pub(crate) const OPEN: f64 = 0.05;
 /// What half the step changes by more than this part of what is there is said.
 const HALVED: f64 = 0.05;
@@ -157,6 +157,11 @@ impl AuditReport {
         let refused = self.beyond(made).into_iter().find(|b| b.verdict == Verdict::Refused)?;
         let Deviation { place, value, time, .. } = refused.miss.clone();
         Some(Failure::Untrue { time, what: place, miss: value, remedy: refused.remedy })
+    }
+
+    /// Whether anything is missed by more than may be.
+    pub(crate) fn is_beyond(&self, made: &Made) -> bool {
+        !self.beyond(made).is_empty()
     }
 
     /// Energy that is gained or lost at once by more than its steps may miss, in the fewest steps that show it.

@@ -378,6 +378,23 @@ fn what_implicit_steps_of_fixed_length_hide_is_told_by_half_of_them() {
     }
 }
 
+/// A ball on a floor that is left within a step: the second bounce of 13 cm is one of 9 cm, and energy balances of the samples leave
+/// all of that open.
+#[test]
+fn what_explicit_steps_of_fixed_length_hide_is_told_by_half_of_them() {
+    let ball = text(
+        "model Ball\n1:v -> I:m(0.5)\nstate h' = v.f from 0.3\nSe:w(-4.905) -> v\nlet depth = max(-h, 0)\nSe:floor(max(1e5*depth - 20*v.f*min(depth/1e-4, 1), 0)) -> v\n",
+    );
+    let by = |step: f64| {
+        let method = Method::Fixed(FixedMethod::Rk4);
+        run(&ball, Run { to: 2.0, every: Some(2e-3), method, step: Some(step), ..Run::default() }).report.audit
+    };
+    let audit = by(1e-3);
+    assert!(audit.verdict == Verdict::Doubtful && audit.warnings[0].contains("half the step"), "{audit:?}");
+    let audit = by(1e-5);
+    assert!(audit.verdict == Verdict::Holds, "{audit:?}");
+}
+
 /// In a mode in which a crank is held its state stands still beside those of other modes.
 #[test]
 fn a_state_that_stands_still_in_a_mode_has_no_part_in_equations_and_matrices() {

@@ -973,3 +973,26 @@ hinge{i} -> 1[frame]:link{i} -> Body:bob{i}(m = 1, J = diag([0.02, 0.03, 0.01]),
     let energy = row.report.audit.energy.expect("it is balanced").value;
     assert!(energy < 1e-8, "{energy:e}");
 }
+
+/// Of an axis and a normal the direction counts.
+#[test]
+fn axes_of_any_length_are_the_same() {
+    let text = |s: f64| {
+        format!(
+            "model Long\nimport std.multibody\nimport std.planar\n\
+             World:world -> 1[frame]:ground\n\
+             ground -> Prismatic:slide(n = [{x:?}, 0, {z:?}], q0 = 0.3) -> 1[frame]:body -> Body:b(m = 2, J = diag([1, 1, 1]))\n\
+             1:way -> slide.axis\nway -> C:spring(k = 100)\n\
+             LineAlong:line(n = [0, 0, {s:?}])\nground -> line.a\nbody -> line.b\n1:stretch -> line.axis\nstretch -> C:soft(k = 20)\n\
+             body -> PointContact:foot(n = [0, 0, {s:?}], k = 1e3, c = 10, mu = 0.2)\n\
+             PlanarWorld:flat -> PlanarPrismatic:rail(n = [0, {s:?}]) -> PlanarBody:puck(m = 1, J = 1)\n\
+             1:rate -> rail.axis\nrate -> C:coil(k = 50)\n",
+            x = 0.6 * s,
+            z = 0.8 * s
+        )
+    };
+    let names = ["slide.q", "line.length", "foot.load", "rail.q"];
+    let [one, long] = [1.0, 2.5].map(|s| run(&text(s), &Run { to: 0.4, rtol: 1e-9, ..Run::default() }));
+    names.iter().for_each(|name| close(last(&long, name), last(&one, name), 1e-7));
+    assert!(last(&one, "rail.q") < -0.1 && last(&one, "slide.q") < 0.25);
+}

@@ -12,6 +12,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Points that have to agree before an expression counts as zero by its values.
 const POINTS: usize = 12;
+/// Of these, points at which many digits are asked: all symbols of one sign, all of the other, and mixed. Where it is zero there, few
+/// digits tell whether it is another branch elsewhere.
+const EXACT_POINTS: usize = 3;
 /// Points that are tried for that: at some of them the expression may be undefined.
 const TRIED: u64 = 48;
 /// Values that are kept.
@@ -134,7 +137,12 @@ impl Exprs {
         if let Some(&told) = self.told.vanishes().get(&(e, given)) {
             return told;
         }
-        let vanishes = self.is_zero_by_values(e, given);
+        let vanishes = match self.node(e) {
+            // What cancels in a product does so in one of its factors, where it is small beside the terms of that.
+            Node::Mul(factors) => factors.iter().any(|&factor| self.is_zero_in(factor, given)),
+            Node::Whole(inner) => self.is_zero_in(*inner, given),
+            _ => self.is_zero_by_values(e, given),
+        };
         self.told.vanishes().insert((e, given), vanishes);
         vanishes
     }
@@ -156,11 +164,15 @@ impl Exprs {
             let mut known = self.told.at();
             known.bound();
             let rough = known.rough.entry((number, given)).or_default();
-            if point.verdict::<f64>(e, rough, &mut constants) == Verdict::Nonzero {
-                return false;
-            }
-            let exact = known.exact.entry((number, given)).or_default();
-            match point.verdict::<BigFloat>(e, exact, &mut constants) {
+            let verdict = match point.verdict::<f64>(e, rough, &mut constants) {
+                Verdict::Zero if zeros >= EXACT_POINTS => Verdict::Zero,
+                Verdict::Nonzero => Verdict::Nonzero,
+                _ => {
+                    let exact = known.exact.entry((number, given)).or_default();
+                    point.verdict::<BigFloat>(e, exact, &mut constants)
+                }
+            };
+            match verdict {
                 Verdict::Nonzero => return false,
                 Verdict::Zero => zeros += 1,
                 Verdict::Unknown => {}

@@ -70,7 +70,8 @@ fn given(graph: &BondGraph) -> Vec<(Symbol, Expr)> {
     signals.chain(stored).collect()
 }
 
-fn storages(graph: &BondGraph) -> impl Iterator<Item = &Storage> {
+/// All storages of a graph.
+pub(crate) fn storages(graph: &BondGraph) -> impl Iterator<Item = &Storage> {
     graph.elements.values().filter_map(|element| match &element.kind {
         Kind::Inertance(storage) | Kind::Compliance(storage) => Some(&**storage),
         _ => None,

@@ -12,8 +12,8 @@ use super::definitions::{Definition, Definitions};
 use super::independent_rows::{IndependentRows, Row, equilibrate};
 use super::points::solved;
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
-use crate::bond_graph::{Guess, Kind, Meaning};
-use crate::causal_graph::start_point::start_point;
+use crate::bond_graph::{Guess, Meaning};
+use crate::causal_graph::start_point::{self, start_point};
 use crate::causal_graph::{CausalGraph, Role};
 
 /// A state that is a sum of stored quantities.
@@ -22,8 +22,9 @@ pub(super) struct Sum {
     pub speed: Symbol,
 }
 
-/// A time at which no source is zero by chance.
+/// A time at which no source is zero by chance, and a number that stands for what is not known to be zero.
 const SOME_TIME: f64 = 0.7361;
+const SOME_NUMBER: f64 = 0.5813;
 /// Of more variables that define each other no values are sought where slopes are taken.
 const MOST_TOGETHER: usize = 64;
 /// Slopes of a loop below this part of its greatest one are rounding.
@@ -76,10 +77,7 @@ fn guessed_flows(d: &Definitions) -> Vec<Symbol> {
 
 /// What the storages hold, in the order of the model; then speeds (or efforts) that are kept without one.
 fn storages(d: &Definitions, causal: &CausalGraph, sums: &[Sum]) -> Vec<Symbol> {
-    let stored = d.graph.elements.values().flat_map(|element| match &element.kind {
-        Kind::Inertance(storage) | Kind::Compliance(storage) => &storage.stored[..],
-        _ => &[],
-    });
+    let stored = start_point::storages(d.graph).flat_map(|storage| &storage.stored);
     let ports = causal.ports.ports.iter().filter(|p| p.role == Role::Independent);
     let inputs: BTreeSet<Symbol> = ports.map(|p| p.input).collect();
     let alone = sums.iter().map(|s| s.speed).filter(|s| !inputs.contains(s) && d.of.contains_key(s));
@@ -93,6 +91,8 @@ struct Freedom {
     reads: Vec<(Symbol, Vec<Symbol>)>,
     /// What reads an unknown that is open.
     open: BTreeSet<Symbol>,
+    /// The unknowns that conditions with one unknown determine.
+    closed: BTreeSet<Symbol>,
     /// Where slopes are taken: what is given has its value.
     point: NumericPoint,
 }
@@ -100,10 +100,11 @@ struct Freedom {
 impl Freedom {
     fn new(d: &Definitions, wanted: &[(Symbol, Expr)], given: &[InitialCondition]) -> Freedom {
         let roots = given.iter().flat_map(|g| d.x.symbols_of(g.residual)).chain(wanted.iter().map(|w| w.0));
-        let mut found = Freedom { reads: reached(d, roots), open: BTreeSet::new(), point: start_point(&d.x, d.graph) };
-        let closed = found.closed(d, given);
-        found.open =
-            found.reads.iter().filter(|(s, _)| is_unknown(d, *s) && !closed.contains(s)).map(|r| r.0).collect();
+        let (open, closed) = (BTreeSet::new(), BTreeSet::new());
+        let mut found = Freedom { reads: reached(d, roots), open, closed, point: start_point(&d.x, d.graph) };
+        found.closed = found.closed(d, given);
+        let is_open = |s: Symbol| is_unknown(d, s) && !found.closed.contains(&s);
+        found.open = found.reads.iter().map(|r| r.0).filter(|&s| is_open(s)).collect();
         found.spread();
         found
     }
@@ -165,10 +166,13 @@ impl Freedom {
         chosen
     }
 
-    /// Definitions that hold where all that is open is zero.
+    /// Definitions that hold where all that is open is zero. What a charge is of which the voltage is given, the point does not say.
     fn zero_definitions(&self, d: &Definitions) -> BTreeSet<Symbol> {
         let mut zero = start_point(&d.x, d.graph);
+        let given = start_point::storages(d.graph).flat_map(|storage| &storage.initial).map(|initial| initial.symbol);
+        let given: BTreeSet<Symbol> = given.collect();
         zero.set([(d.graph.time, SOME_TIME)]);
+        zero.set(self.closed.difference(&given).map(|&s| (s, SOME_NUMBER)));
         zero.set(self.open.iter().map(|&s| (s, 0.0)));
         let definition = |s: &Symbol| d.of.get(s).copied().filter(|_| !is_unknown(d, *s));
         let mut holds = |s: &Symbol| definition(s).is_none_or(|of| zero.value(&d.x, of.expr()) == 0.0);

@@ -157,6 +157,8 @@ pub enum EquilibriumError {
     Missed(String, f64),
     /// Where all is at rest, branches of these set-valued laws have ended.
     Ended(Vec<String>),
+    /// Where all the rest is at rest, signals that are held set it in motion: these are there.
+    Held(Vec<String>),
     /// The relations that the structure implies among its states are too long to be written out.
     Relations,
     /// The model has no value on the way.
@@ -182,6 +184,12 @@ impl fmt::Display for EquilibriumError {
                 "no equilibrium was found: where the branches with which the model begins are at rest, {} would have another; \
                  let it come to rest in a run, and start there",
                 laws.join(", ")
+            ),
+            EquilibriumError::Held(signals) => write!(
+                f,
+                "no equilibrium was found: where all else is at rest, what is held ({}) is another value in a run, which sets it in \
+                 motion; give it the value of rest at the start, or let it come to rest in a run and start there",
+                signals.join(", ")
             ),
             EquilibriumError::Relations => write!(
                 f,

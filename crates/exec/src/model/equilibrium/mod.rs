@@ -12,12 +12,14 @@ mod rest;
 mod tangent;
 
 use super::{EquilibriumError, Model};
-use halfarrow_sim::{Jacobian, System};
+use halfarrow_sim::{Events, Jacobian, System};
 use leaf::Leaf;
 use point::LinearisedPoint;
 use rest::Rest;
 
 const ITERATIONS: usize = 200;
+/// How often what is delayed or sampled is taken anew where the rest has come to rest.
+const ROUNDS: usize = 50;
 /// Up to so many states equations are full.
 const FEW_STATES: usize = 50;
 /// A rate that changes its state by less than this part of it, in the shortest time that the model knows, says nothing of a step.
@@ -69,6 +71,9 @@ impl Model {
     /// by continuation: the loads that would hold `x` at rest are taken away little by little, and the equilibrium is followed,
     /// round folds too.
     ///
+    /// What is delayed or sampled is what it follows, as at a start: it is taken anew where a search has ended, until nothing moves. Where
+    /// a set-valued law is at rest at `x` in another branch than that with which runs begin, as a block that sticks, `x` is the answer.
+    ///
     /// The search goes only where the junction structure lets the states go from `x`: relations of displacements hold at
     /// the equilibrium as they do at `x`, those of constraints and those that the graph implies. `x` should keep the
     /// constraints.
@@ -82,7 +87,11 @@ impl Model {
         }
         self.restart();
         let before = self.run.positions.clone();
-        let found = self.search_equilibrium(t, x).and_then(|found| self.in_this_mode(t, found));
+        let sticks = !self.code.program.set_valued.is_empty() && self.begins_at_rest(t, x);
+        let found = match sticks {
+            true => Ok(Equilibrium { x: x.to_vec(), free: 0, iterations: 0 }),
+            false => self.search_with_held_signals(t, x),
+        };
         let found = found.and_then(|found| {
             self.vary_rest(t, &found.x).map_err(EquilibriumError::Failure)?;
             Ok(found)
@@ -92,6 +101,43 @@ impl Model {
             self.start_at_positions();
         }
         found
+    }
+
+    /// The search, again from where it has ended as long as held signals are others there.
+    fn search_with_held_signals(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
+        let mut x = x.to_vec();
+        for _ in 0..ROUNDS {
+            self.begin_delays_and_samples(t, &x).map_err(EquilibriumError::Failure)?;
+            let found = self.search_equilibrium(t, &x).and_then(|found| self.in_this_mode(t, found))?;
+            if self.run.delays_and_samples.is_empty() || self.begins_at_rest(t, &found.x) {
+                return Ok(found);
+            }
+            x = found.x;
+        }
+        Err(EquilibriumError::Held(self.code.program.held.iter().map(|held| held.name.clone()).collect()))
+    }
+
+    /// Whether a run that begins at `(t, x)` is at rest there: after what happens at its beginning, in the branches of set-valued laws
+    /// that it then has.
+    fn begins_at_rest(&self, t: f64, x: &[f64]) -> bool {
+        let (mut begun, mut y) = (self.clone(), x.to_vec());
+        begun.restart();
+        let begins = begun.begin_delays_and_samples(t, x).is_ok() && begun.handle_event(t, &mut y).is_ok();
+        // In another branch other variables may tell the same state; what happens at events would be another one.
+        let same = match begun.run.mode == self.run.mode {
+            true => y == x,
+            false => begun.code.program.clauses.iter().all(|clause| clause.bound.is_some()),
+        };
+        if !(begins && same) {
+            return false;
+        }
+        let leaf = begun.leaf(t, &y);
+        let mut jacobian = Jacobian::new(begun.sparsity());
+        let Ok(inert) = begun.inert(&mut jacobian, t, &y) else { return false };
+        let Ok(at) = begun.point(&mut jacobian, (leaf.as_ref(), inert.as_slice()), t, y) else { return false };
+        let mut rest = Rest::new(at.x.len());
+        rest.see(&at);
+        rest.is_reached(&at)
     }
 
     /// What was found, if no branch of a set-valued law has ended there.
