@@ -55,10 +55,10 @@ pub(crate) fn rates(
             let rate = graph.storage_symbols(port).map(|(_, rate)| rate);
             match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
                 (Some(x), Some(rate)) => {
-                    // What acts on it for as long as the run lasts makes that much by its rounding alone.
+                    // What acts on it for as long as the run lasts makes that much by its rounding, and by what the method misses of it.
                     let acts = graph.storage_symbols(port).map(|(_, rate)| scales.of(graph, rate));
                     let mut terms = vec![Term::of(Quantity::Of(stored), 1.0)];
-                    terms.extend(acts.map(|acts| Term::beside(acts, scales.span())));
+                    terms.extend(acts.map(|acts| Term::acting(acts, scales.span())));
                     if let Some(k) = jumps(values.times, x, JUMPED * greatest(x)).iter().position(|j| *j != 0.0) {
                         let (name, time) = (&element.name, values.times[k]);
                         unchecked
@@ -99,7 +99,7 @@ pub(crate) fn rates(
         held.compare(values, settled, worst, || {
             // What its rate reads moves it: the terms that its rate has in the middle of the run.
             let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
-            reads.into_iter().map(|(quantity, weight)| Term::beside(quantity, weight * scales.span())).collect()
+            reads.into_iter().map(|(quantity, weight)| Term::acting(quantity, weight * scales.span())).collect()
         });
     }
 }

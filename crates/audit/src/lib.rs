@@ -214,6 +214,11 @@ impl Auditor {
         self.scales.neglect(&self.graph, symbol, magnitude);
     }
 
+    /// The method of the run may have missed this part of what acts.
+    pub fn tolerate(&mut self, part: f64) {
+        self.scales.tolerate(part);
+    }
+
     /// What was found.
     pub fn finish(self) -> Audit {
         let settled = self.scales.settled();

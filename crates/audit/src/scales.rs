@@ -58,17 +58,24 @@ pub(crate) struct Term {
     pub weight: f64,
     /// Whether it only stands beside what is missed.
     pub beside: bool,
+    /// Whether it acts on what is missed, and is no better known than the method tells it.
+    pub acts: bool,
 }
 
 impl Term {
     /// What is missed is of this.
     pub fn of(quantity: Quantity, weight: f64) -> Term {
-        Term { quantity, weight, beside: false }
+        Term { quantity, weight, beside: false, acts: false }
     }
 
     /// What is missed stands beside this.
     pub fn beside(quantity: Quantity, weight: f64) -> Term {
-        Term { quantity, weight, beside: true }
+        Term { quantity, weight, beside: true, acts: false }
+    }
+
+    /// This acts on what is missed.
+    pub fn acting(quantity: Quantity, weight: f64) -> Term {
+        Term { quantity, weight, beside: true, acts: true }
     }
 }
 
@@ -209,6 +216,8 @@ pub(crate) struct Scales {
     given: Sizes,
     /// Magnitudes below which the method of the run neglected what happens.
     neglected: BTreeMap<usize, f64>,
+    /// The part of what acts that the method of the run may miss.
+    tolerance: f64,
     begun: Option<f64>,
     /// Length of the run so far, in s.
     span: f64,
@@ -255,6 +264,7 @@ impl Scales {
             turnovers: Sizes::of(&places),
             given: Sizes::of(&places),
             neglected: BTreeMap::new(),
+            tolerance: 0.0,
             begun: None,
             span: 0.0,
             places: Arc::new(places),
@@ -326,6 +336,11 @@ impl Scales {
             let least = self.neglected.entry(place).or_default();
             *least = least.max(magnitude);
         }
+    }
+
+    /// Takes note of the part of what acts that the method may miss.
+    pub fn tolerate(&mut self, part: f64) {
+        self.tolerance = self.tolerance.max(part);
     }
 
     fn note(&mut self, quantity: Quantity, magnitude: f64) {
@@ -401,7 +416,7 @@ impl Scales {
         for (place, least) in self.least_stored() {
             of[place].own = of[place].own.max(least);
         }
-        Settled { places: self.places.clone(), of }
+        Settled { places: self.places.clone(), of, tolerance: self.tolerance }
     }
 
     /// What the stored quantities count as at least, since the method neglected what is less. It is believed up to what
@@ -538,6 +553,8 @@ struct Size {
 pub(crate) struct Settled {
     places: Arc<Places>,
     of: Vec<Size>,
+    /// The part of what acts that the method of the run may miss.
+    tolerance: f64,
 }
 
 /// What a miss is measured with.
@@ -552,7 +569,11 @@ impl Settled {
     pub fn scale(&self, terms: &[Term]) -> Scale {
         terms.iter().fold(Scale { own: LEAST, beside: LEAST }, |most, term| {
             let Size { own, beside, .. } = self.size(term.quantity);
-            let part = if term.beside { FLOOR } else { 1.0 };
+            let part = match term.beside {
+                true if term.acts => FLOOR.max(self.tolerance),
+                true => FLOOR,
+                false => 1.0,
+            };
             Scale { own: most.own.max(part * term.weight * own), beside: most.beside.max(term.weight * beside) }
         })
     }

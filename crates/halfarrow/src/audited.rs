@@ -82,12 +82,18 @@ pub struct Audited<'a, M> {
     book: Book,
 }
 
+/// By how many times the error that steps are allowed what acts may be missed: that of a force by what is allowed of the place that a
+/// controller reads.
+const MISSED: f64 = 30.0;
+
 /// What is recorded.
 struct Book {
     /// Taken out where it is handed on.
     auditor: Option<PlacedAuditor>,
     /// What the method was allowed to neglect of each state, as far as it said so.
     neglected: Vec<f64>,
+    /// The part of what acts that it may miss.
+    tolerance: f64,
     recorded: Arc<Recorded>,
     times: Vec<f64>,
     /// The values of all names at each time, one time after the other.
@@ -123,6 +129,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
             times: Vec::new(),
             auditor: Some(PlacedAuditor::Here(Box::new(auditor))),
             neglected: Vec::new(),
+            tolerance: 0.0,
             origins,
             infinite: BTreeMap::new(),
             out: Vec::new(),
@@ -140,6 +147,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         let mut auditor = self.book.auditor.take().expect("it is handed back").into_auditor();
         let tracked = self.model.program().tracked.iter();
         tracked.zip(&self.book.neglected).for_each(|(&symbol, error)| auditor.neglect(symbol, *error));
+        auditor.tolerate(self.book.tolerance);
         if let Some(last) = self.book.part() {
             look(&mut auditor, &self.book.recorded, &last);
         }
@@ -487,6 +495,7 @@ impl Sink for Auditing<'_> {
     fn tolerances(&mut self, magnitudes: &[f64], absolute: &[f64]) {
         self.book.neglected.clear();
         self.book.neglected.extend(absolute.iter().map(|error| error / self.rtol));
+        self.book.tolerance = MISSED * self.rtol;
         self.sink.tolerances(magnitudes, absolute);
     }
     fn crawls(&mut self, crawl: &Crawl) {

@@ -183,6 +183,20 @@ fn where_all_is_zero_all_is_well() {
     }
 }
 
+/// What a controller holds against its weight moves by what the tolerance leaves of either.
+#[test]
+fn what_is_held_at_rest_raises_no_alarm() {
+    let held = "model Held\nimport std.signals\n1:v -> I:m(2)\nstate x' = v.f from 0\nSe:w(-19.62) -> v\nPID:pid(error = 0.3 - x, kp = 200, ki = 50, kd = 20)\nSe:act(pid.u) -> v\n";
+    let cruise = "model Cruise\nimport std.signals\n1:v -> I:m(1000)\nPID:pid(error = 20 - v.f, kp = 500, ki = 50)\nSe:act(pid.u) -> v\nv -> R:drag(e = 0.5*f*abs(f))\nSe:hill(-1000*9.81*sin(0.05)) -> v\n";
+    for model in [text(held), text(cruise)] {
+        for to in [0.5, 1.0, 10.0] {
+            let audit =
+                run(&model, &Run { to, start: Start::Equilibrium, ..Run::default() }).expect("it rests").report.audit;
+            assert_eq!(audit.verdict, Verdict::Holds, "{to} s: {audit:?}");
+        }
+    }
+}
+
 #[test]
 fn what_comes_to_rest_raises_no_alarm() {
     let model = text("model M\n1:a -> I:m(1, f0 = 1)\na -> R:d(50)\na -> C:spring(k = 3, q0 = 1)\nSe:w(3) -> a\n");

@@ -173,7 +173,10 @@ impl fmt::Display for EquilibriumError {
                 for (i, (name, rate)) in rates.iter().enumerate() {
                     write!(f, "{} {name} still changes at {rate:e} a second", if i == 0 { "" } else { " and" })?;
                 }
-                write!(f, "; a source that drives it for ever, a momentum that nothing takes, or a spring that is missing may be the reason")
+                write!(
+                    f,
+                    "; a source that drives it for ever, a momentum that nothing takes, or a spring that is missing may be the reason"
+                )
             }
             EquilibriumError::Missed(constraint, miss) => write!(
                 f,

@@ -183,12 +183,12 @@ impl Model {
         let mut pseudo_step = f64::INFINITY;
         let mut least: Option<LeastRates> = None;
         let mut rest = Rest::new(x.len());
-        // Where the shortest steps have ended.
+        // Where steps as the motion goes have ended.
         let mut stuck: Option<LinearisedPoint> = None;
         let mut at = self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
         for iteration in 0..ITERATIONS {
             rest.see(&at);
-            let Some(newton) = at.newton_step(stuck.is_some()) else { break };
+            let Some(newton) = at.newton_step(stuck.is_none()) else { break };
             let found = || Equilibrium { x: at.x.clone(), free: newton.free, iterations: iteration };
             let weights = bounded_weights(&newton.weights, leaf, &at);
             let first = || LeastRates { weights: weights.clone(), least: f64::INFINITY, moving: Vec::new() };
@@ -232,7 +232,7 @@ impl Model {
                 }
                 // No step comes nearer, since only rounding is left.
                 None if rest.is_reached(&at) => return Ok(found()),
-                // The shortest steps end where nothing can be done, as tyres that hold all that they can: as the motion goes, then.
+                // Steps as the motion goes end where nothing can be done: the shortest ones, then.
                 None if pseudo_step.is_infinite() && stuck.is_none() && newton.free > 0 && x.len() <= FEW_STATES => {
                     let start =
                         self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;

@@ -57,8 +57,8 @@ impl LinearisedPoint {
         (rows, columns)
     }
 
-    /// The step of Newton's method: of many the shortest, or of few states that which the motion makes. `None` if it does not
-    /// come out.
+    /// The step of Newton's method: of many the shortest, or of few states that which the motion makes, if there is one. `None` if
+    /// it does not come out.
     pub fn newton_step(&self, led: bool) -> Option<NewtonStep> {
         match &self.ways {
             Ways::Full { directions, along } => {
@@ -66,7 +66,10 @@ impl LinearisedPoint {
                 let mut newton = minimum_norm::step(along, &self.rates, count)?;
                 let free = count - newton.rank;
                 if led && free > 0 {
-                    led::led(&self.square(directions, along), &mut newton.step)?;
+                    let mut step = newton.step.clone();
+                    if led::led(&self.square(directions, along), &mut step).is_some() {
+                        newton.step = step;
+                    }
                 }
                 Some(NewtonStep { step: directions.step(&newton.step), free, weights: newton.weights })
             }
