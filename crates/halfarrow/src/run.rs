@@ -262,6 +262,13 @@ fn shares((count, first, names): (usize, f64, Vec<String>)) -> String {
     )
 }
 
+/// That a place of rest has others beside it.
+pub(crate) fn one_of_many(free: usize) -> Option<String> {
+    let combinations =
+        if free == 1 { "a combination of states is".into() } else { format!("{free} combinations of states are") };
+    (free > 0).then(|| format!("the equilibrium is one of many, near the start values: {combinations} free"))
+}
+
 /// A result that satisfies the model, as the audit found: what is doubtful is said, what is wrong is refused.
 fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, Error> {
     match outcome {
@@ -377,7 +384,8 @@ impl Model {
         notes.extend(projected(system.program(), run.project, run.method)?);
         let by = quantities(system, run)?;
         vary(system, &by)?;
-        let start = self.start(system, run.start)?;
+        let (start, free) = self.start_with_freedom(system, run.start)?;
+        notes.extend(one_of_many(free));
         let options = options(run)?;
         if options.check(start.len()).is_ok() {
             cost::check(system, &start, &options, system.observed())?;
@@ -411,7 +419,8 @@ impl Model {
             }
             false => {}
         }
-        let x = self.start(system.reference_mut(), run.start)?;
+        let (x, free) = self.start_with_freedom(system.reference_mut(), run.start)?;
+        notes.extend(one_of_many(free));
         set_spring_rate(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         timings.start = begun.elapsed().as_secs_f64();
@@ -611,11 +620,16 @@ impl Model {
     }
 
     pub(crate) fn start(&self, system: &mut exec::Model, start: Start) -> Result<Vec<f64>, Error> {
+        self.start_with_freedom(system, start).map(|(x, _)| x)
+    }
+
+    /// The start, and how many combinations of states are free there: 0 unless it is one of many places of rest.
+    fn start_with_freedom(&self, system: &mut exec::Model, start: Start) -> Result<(Vec<f64>, usize), Error> {
         let x = system.initialise(0.0).map_err(|error| self.no_start(error))?;
         match start {
-            Start::Given => Ok(x),
+            Start::Given => Ok((x, 0)),
             Start::Equilibrium => match system.equilibrium(0.0, &x) {
-                Ok(equilibrium) => Ok(equilibrium.x),
+                Ok(equilibrium) => Ok((equilibrium.x, equilibrium.free)),
                 Err(EquilibriumError::Failure(failure)) => Err(self.stopped(failure)),
                 Err(error) => Err(Problem::NoEquilibrium { reason: error.to_string() }.into()),
             },

@@ -20,7 +20,7 @@ use crate::error::{Error, Problem};
 use crate::input::{Input, connect};
 use crate::linear_algebra::{Complex, eigenvalues};
 use crate::model::Model;
-use crate::run::Start;
+use crate::run::{Start, one_of_many};
 
 pub use response::Response;
 pub use stability::Stability;
@@ -278,12 +278,7 @@ impl Model {
                 })?;
                 x = found.x;
                 system.handle_event(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
-                if found.free > 0 {
-                    notes.push(format!(
-                        "the equilibrium is one of many: {} combinations of states are free",
-                        found.free
-                    ));
-                }
+                notes.extend(one_of_many(found.free));
                 Ok(("equilibrium", 0.0, x))
             }
             Point::Time(t) if t.is_finite() && t >= 0.0 => {
