@@ -996,3 +996,22 @@ fn axes_of_any_length_are_the_same() {
     names.iter().for_each(|name| close(last(&long, name), last(&one, name), 1e-7));
     assert!(last(&one, "rail.q") < -0.1 && last(&one, "slide.q") < 0.25);
 }
+
+/// Cut joints too, whether their axes are shorter or longer than 1: a body that turns, slides or swings on two of the same.
+#[test]
+fn axes_of_cut_joints_of_any_length_are_the_same() {
+    for cut in ["CutRevolute", "CutPrismatic", "CutInline", "CutInplane"] {
+        let text = |s: f64| {
+            format!(
+                "model Cut\nimport std.multibody\nWorld:world -> 1[frame]:ground\n\
+                 ground -> Free:loose(w0 = [0.4, 0, 0], v0 = [0.3, 0, 0]) -> 1[frame]:body -> Body:b(m = 2, J = diag([1, 2, 3]))\n\
+                 {cut}:cut(n = [{s:?}, 0, 0])\nground -> cut.a\nbody -> cut.b\n"
+            )
+        };
+        let ends = [1.0, 0.5, 2.5].map(|s| {
+            let done = run(&text(s), &Run { to: 0.5, rtol: 1e-10, ..Run::default() });
+            ["loose.x.q", "loose.z.q", "b.inertia.x.f"].map(|name| last(&done, name))
+        });
+        ends.iter().for_each(|end| end.iter().zip(ends[0]).for_each(|(found, wanted)| close(*found, wanted, 1e-8)));
+    }
+}
