@@ -550,8 +550,9 @@ impl<'a, 'b> Check<'a, 'b> {
             let off = self.least(reader, k, miss(&found[k]), miss);
             self.worst.note_of(law.number, off, scale, settled, || {
                 let all = sensitivities(graph, scales, settled, reader, k, miss);
-                let term = |(quantity, weight)| Term { quantity, weight, beside: several, acts: false };
-                let terms = [natural].into_iter().chain(all.into_iter().map(term)).collect();
+                let term = if several { Term::beside } else { Term::of };
+                let terms = all.into_iter().map(|(quantity, weight)| term(quantity, weight));
+                let terms = [natural].into_iter().chain(terms).collect();
                 raw(off, values.times[k], law.name, law.law.what(), terms)
             });
         }

@@ -56,26 +56,34 @@ pub(crate) enum Quantity {
 pub(crate) struct Term {
     pub quantity: Quantity,
     pub weight: f64,
-    /// Whether it only stands beside what is missed.
-    pub beside: bool,
-    /// Whether it acts on what is missed, and is no better known than the method tells it.
-    pub acts: bool,
+    pub standing: Standing,
+}
+
+/// What something is to what is missed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Standing {
+    /// The same.
+    Own,
+    /// It only stands beside it.
+    Beside,
+    /// It acts on it, and is no better known than the method tells it.
+    Acting,
 }
 
 impl Term {
     /// What is missed is of this.
     pub fn of(quantity: Quantity, weight: f64) -> Term {
-        Term { quantity, weight, beside: false, acts: false }
+        Term { quantity, weight, standing: Standing::Own }
     }
 
     /// What is missed stands beside this.
     pub fn beside(quantity: Quantity, weight: f64) -> Term {
-        Term { quantity, weight, beside: true, acts: false }
+        Term { quantity, weight, standing: Standing::Beside }
     }
 
     /// This acts on what is missed.
     pub fn acting(quantity: Quantity, weight: f64) -> Term {
-        Term { quantity, weight, beside: true, acts: true }
+        Term { quantity, weight, standing: Standing::Acting }
     }
 }
 
@@ -569,10 +577,10 @@ impl Settled {
     pub fn scale(&self, terms: &[Term]) -> Scale {
         terms.iter().fold(Scale { own: LEAST, beside: LEAST }, |most, term| {
             let Size { own, beside, .. } = self.size(term.quantity);
-            let part = match term.beside {
-                true if term.acts => FLOOR.max(self.tolerance),
-                true => FLOOR,
-                false => 1.0,
+            let part = match term.standing {
+                Standing::Own => 1.0,
+                Standing::Beside => FLOOR,
+                Standing::Acting => FLOOR.max(self.tolerance),
             };
             Scale { own: most.own.max(part * term.weight * own), beside: most.beside.max(term.weight * beside) }
         })

@@ -342,12 +342,11 @@ impl Model {
         let begun = Moment::now();
         let Begun { start, options, by, notes } = self.begin_explicit(&mut system, run)?;
         timings.start = begun.elapsed().as_secs_f64();
-        let steps_over = matches!(options.method, Method::Fixed(_));
-        let again = steps_over.then(|| (system.clone(), start.clone()));
         let mut done =
             self.integrate(&mut system, start, (&options, run.execution, &by), (notes, None), &mut *progress)?;
-        let doubtful = done.report.audit.open > OPEN && !done.report.audit.is_beyond(&Made::by(run));
-        if let Some((mut system, start)) = again.filter(|_| doubtful) {
+        let fixed = matches!(options.method, Method::Fixed(_));
+        if fixed && done.report.audit.open > OPEN && !done.report.audit.is_beyond(&Made::by(run)) {
+            let start = self.start(&mut system, run.start)?;
             let options = Options { step: options.step.map(|step| 0.5 * step), ..options };
             let halved =
                 self.integrate(&mut system, start, (&options, run.execution, &by), (Vec::new(), None), progress);
@@ -624,7 +623,11 @@ impl Model {
     }
 
     /// The start, and how many combinations of states are free there: 0 unless it is one of many places of rest.
-    fn start_with_freedom(&self, system: &mut exec::Model, start: Start) -> Result<(Vec<f64>, usize), Error> {
+    pub(crate) fn start_with_freedom(
+        &self,
+        system: &mut exec::Model,
+        start: Start,
+    ) -> Result<(Vec<f64>, usize), Error> {
         let x = system.initialise(0.0).map_err(|error| self.no_start(error))?;
         match start {
             Start::Given => Ok((x, 0)),

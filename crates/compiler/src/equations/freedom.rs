@@ -168,7 +168,7 @@ impl Freedom {
 
     /// Definitions that hold where all that is open is zero. What a charge is of which the voltage is given, the point does not say.
     fn zero_definitions(&self, d: &Definitions) -> BTreeSet<Symbol> {
-        let mut zero = start_point(&d.x, d.graph);
+        let mut zero = self.point.clone();
         let given = start_point::storages(d.graph).flat_map(|storage| &storage.initial).map(|initial| initial.symbol);
         let given: BTreeSet<Symbol> = given.collect();
         zero.set([(d.graph.time, SOME_TIME)]);

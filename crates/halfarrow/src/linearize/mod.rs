@@ -265,21 +265,16 @@ impl Model {
         at: Point,
         notes: &mut Vec<String>,
     ) -> Result<(&'static str, f64, Vec<f64>), Error> {
-        let mut x = self.start(system, Start::Given)?;
+        let (start, name) = match at {
+            Point::Equilibrium => (Start::Equilibrium, "equilibrium"),
+            _ => (Start::Given, "start"),
+        };
+        let (mut x, free) = self.start_with_freedom(system, start)?;
         match at {
-            Point::Start => {
+            Point::Start | Point::Equilibrium => {
                 system.handle_event(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
-                Ok(("start", 0.0, x))
-            }
-            Point::Equilibrium => {
-                let found = system.equilibrium(0.0, &x).map_err(|error| match error {
-                    exec::EquilibriumError::Failure(failure) => self.stopped(failure),
-                    error => Problem::NoEquilibrium { reason: error.to_string() }.into(),
-                })?;
-                x = found.x;
-                system.handle_event(0.0, &mut x).map_err(|failure| self.stopped(failure))?;
-                notes.extend(one_of_many(found.free));
-                Ok(("equilibrium", 0.0, x))
+                notes.extend(one_of_many(free));
+                Ok((name, 0.0, x))
             }
             Point::Time(t) if t.is_finite() && t >= 0.0 => {
                 if t == 0.0 {

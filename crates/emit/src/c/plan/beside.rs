@@ -1,5 +1,6 @@
 //! The columns of a Jacobian by rates beside a state: what these have in common is computed once.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::ids::Id;
@@ -66,6 +67,33 @@ impl Part {
     fn price(&self) -> u64 {
         self.work * (self.groups.len() as u64 + PRICE_OF_CODE)
     }
+
+    /// What is saved where both are one, if that saves something.
+    fn saved_with(&self, other: &Part, works: &[u64]) -> Option<u64> {
+        (self.price() + other.price()).checked_sub(self.with(other, works).price())
+    }
+}
+
+/// Puts parts together as long as that pays, those first that save most.
+fn put_together(parts: Vec<Part>, works: &[u64]) -> Vec<Part> {
+    let mut parts: Vec<Option<Part>> = parts.into_iter().map(Some).collect();
+    let saved = |parts: &[Option<Part>], a: usize, b: usize| parts[a].as_ref()?.saved_with(parts[b].as_ref()?, works);
+    let row = |b: usize| (0..b).map(|a| saved(&parts, a, b)).collect();
+    // What is saved by each pair: by the later one, then by the earlier one.
+    let mut table: Vec<Vec<Option<u64>>> = (0..parts.len()).map(row).collect();
+    loop {
+        let pairs = (0..parts.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
+        let known = pairs.filter_map(|(a, b)| Some((table[b][a]?, (Reverse(b), Reverse(a)))));
+        let Some((_, (Reverse(b), Reverse(a)))) = known.max() else { break };
+        let other = parts[b].take();
+        parts[a] = parts[a].as_ref().zip(other.as_ref()).map(|(part, other)| part.with(other, works));
+        for i in (0..parts.len()).filter(|i| *i != a && *i != b) {
+            table[a.max(i)][a.min(i)] = saved(&parts, a.min(i), a.max(i));
+            table[b.max(i)][b.min(i)] = None;
+        }
+        table[b][a] = None;
+    }
+    parts.into_iter().flatten().collect()
 }
 
 impl Beside {
@@ -117,7 +145,6 @@ impl Beside {
 }
 
 /// Groups of columns in parts, each with whether code of its own is written for it, and the part of all operations that this leaves.
-/// Parts are put together as long as that pays.
 fn parts_of(program: &Program, rates: &Routine, groups: &[Vec<usize>]) -> Option<(Vec<(Part, bool)>, f64)> {
     // Kinds of work: by which groups move it.
     let moved: Vec<Vec<bool>> = groups.iter().map(|states| program.moved_by_states(states)).collect();
@@ -130,27 +157,9 @@ fn parts_of(program: &Program, rates: &Routine, groups: &[Vec<usize>]) -> Option
     let works: Vec<u64> = kinds.values().copied().collect();
     let all: u64 = works.iter().sum();
     let own = |group: usize| Part::of(vec![group], kinds.keys().map(|by| by[group]).collect(), &works);
-    let mut parts: Vec<Part> = (0..groups.len()).map(own).collect();
-    loop {
-        let pairs = (0..parts.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-        let saved = |&(a, b): &(usize, usize)| {
-            let apart = parts[a].price() + parts[b].price();
-            apart.checked_sub(parts[a].with(&parts[b], &works).price())
-        };
-        let best = pairs
-            .filter_map(|pair| Some((saved(&pair)?, pair)))
-            .max_by_key(|(saved, (a, b))| (*saved, usize::MAX - b, usize::MAX - a));
-        let Some((_, (a, b))) = best else { break };
-        let other = parts.remove(b);
-        parts[a] = parts[a].with(&other, &works);
-    }
-    let parts: Vec<(Part, bool)> = parts
-        .into_iter()
-        .map(|part| {
-            let is_written = part.price() < all * part.groups.len() as u64;
-            (part, is_written)
-        })
-        .collect();
+    let is_written = |part: &Part| part.price() < all * part.groups.len() as u64;
+    let parts = put_together((0..groups.len()).map(own).collect(), &works);
+    let parts: Vec<(Part, bool)> = parts.into_iter().map(|part| (part.clone(), is_written(&part))).collect();
     let work: u64 = parts
         .iter()
         .map(|(part, is_written)| part.groups.len() as u64 * if *is_written { part.work } else { all })

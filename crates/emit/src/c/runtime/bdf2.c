@@ -56,7 +56,6 @@ static $real ha_beside(const ha_model *m, $real h, int i)
 static void ha_find_common(ha_model *m, double t)
 {
     int status;
-    int i;
     m->common_known = 0;
 //if assumptions
     if (m->broken) {
@@ -72,12 +71,9 @@ static void ha_find_common(ha_model *m, double t)
 //if common_newton
     {
         static const int blocks[] = {$COMMON_BLOCKS};
-        for (i = 0; i < $COMMON_BLOCK_COUNT; ++i) {
-            m->common_known = m->common_known && m->fresh[blocks[i]];
-        }
+        m->common_known = m->common_known && $ha_stay(m, blocks, $COMMON_BLOCK_COUNT);
     }
 //end
-    (void)i;
 }
 
 //item ha_part_code

@@ -68,6 +68,21 @@ static int ha_run(ha_model *m, ha_code code, double t, const $real *x, $real *ou
     return status;
 }
 
+//if newton
+//item ha_stay
+/* Whether the solutions of these blocks are what they are when they are asked for again: those that are refined then are others. */
+static int ha_stay(const ha_model *m, const int *blocks, int count)
+{
+    int i;
+    for (i = 0; i < count; ++i) {
+        if (!m->fresh[blocks[i]]) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+//end
 //if looks_ahead
 //item ha_is_known_ahead
 /* Whether what is asked for at (t, x) has been found where a step ended there, but for what inputs move. */
@@ -100,7 +115,6 @@ static void ha_forget_ahead(ha_model *m)
 static void ha_find_ahead(ha_model *m, double t, const $real *x)
 {
     int status;
-    int i;
     m->ahead_known = 0;
 //if assumptions
     if (m->broken) {
@@ -114,16 +128,12 @@ static void ha_find_ahead(ha_model *m, double t, const $real *x)
     }
 //if ahead_newton
     {
-        /* Solutions that are refined when they are asked for again were others. */
         static const int blocks[] = {$AHEAD_BLOCKS};
-        for (i = 0; i < $AHEAD_BLOCK_COUNT; ++i) {
-            if (!m->fresh[blocks[i]]) {
-                return;
-            }
+        if (!$ha_stay(m, blocks, $AHEAD_BLOCK_COUNT)) {
+            return;
         }
     }
 //end
-    (void)i;
     $ha_copy(m->ahead_x, x, HA_NX);
     $ha_copy(m->ahead_u, m->u, HA_NU);
 //if modes
