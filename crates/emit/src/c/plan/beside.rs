@@ -1,11 +1,11 @@
 //! The columns of a Jacobian by rates beside a state: what these have in common is computed once.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::program::elimination::products;
-use halfarrow_compiler::program::{BlockId, Method, Program, Routine, Step, Value};
+use halfarrow_compiler::program::{BlockId, Local, Method, Program, Routine, Step, Value};
 
 use super::Plan;
 use super::events::cases_of;
@@ -47,51 +47,61 @@ pub(super) struct BesideRoutines {
 #[derive(Debug, Clone)]
 struct Part {
     groups: Vec<usize>,
-    /// Which kinds of work these states ask for.
-    kinds: Vec<bool>,
+    /// Which kinds of work these states ask for: all bits of what is asked for.
+    kinds: Vec<u32>,
     work: u64,
 }
 
 impl Part {
-    fn of(groups: Vec<usize>, kinds: Vec<bool>, works: &[u64]) -> Part {
-        let work = kinds.iter().zip(works).filter(|(asked, _)| **asked).map(|(_, work)| work).sum();
+    fn of(groups: Vec<usize>, kinds: Vec<u32>, works: &[u32]) -> Part {
+        let work = kinds.iter().zip(works).map(|(asked, work)| asked & work).sum::<u32>().into();
         Part { groups, kinds, work }
     }
 
-    fn with(&self, other: &Part, works: &[u64]) -> Part {
-        let kinds = self.kinds.iter().zip(&other.kinds).map(|(a, b)| *a || *b).collect();
+    fn with(&self, other: &Part, works: &[u32]) -> Part {
+        let kinds = self.kinds.iter().zip(&other.kinds).map(|(a, b)| a | b).collect();
         Part::of([&self.groups[..], &other.groups].concat(), kinds, works)
     }
 
-    /// What it costs to compute all its columns, and to have its code.
     fn price(&self) -> u64 {
-        self.work * (self.groups.len() as u64 + PRICE_OF_CODE)
+        price(self.work, self.groups.len())
     }
 
     /// What is saved where both are one, if that saves something.
-    fn saved_with(&self, other: &Part, works: &[u64]) -> Option<u64> {
-        (self.price() + other.price()).checked_sub(self.with(other, works).price())
+    fn saved_with(&self, other: &Part, works: &[u32]) -> Option<u64> {
+        let asked = self.kinds.iter().zip(&other.kinds).zip(works);
+        let work: u32 = asked.map(|((a, b), work)| (a | b) & work).sum();
+        (self.price() + other.price()).checked_sub(price(work.into(), self.groups.len() + other.groups.len()))
     }
 }
 
+/// What it costs to compute so many groups of columns, and to have the code.
+fn price(work: u64, groups: usize) -> u64 {
+    work * (groups as u64 + PRICE_OF_CODE)
+}
+
 /// Puts parts together as long as that pays, those first that save most.
-fn put_together(parts: Vec<Part>, works: &[u64]) -> Vec<Part> {
+fn put_together(parts: Vec<Part>, works: &[u32]) -> Vec<Part> {
+    // How often each has become another one: what was told of it before counts no more.
+    let mut changes = vec![0; parts.len()];
     let mut parts: Vec<Option<Part>> = parts.into_iter().map(Some).collect();
-    let saved = |parts: &[Option<Part>], a: usize, b: usize| parts[a].as_ref()?.saved_with(parts[b].as_ref()?, works);
-    let row = |b: usize| (0..b).map(|a| saved(&parts, a, b)).collect();
-    // What is saved by each pair: by the later one, then by the earlier one.
-    let mut table: Vec<Vec<Option<u64>>> = (0..parts.len()).map(row).collect();
-    loop {
-        let pairs = (0..parts.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-        let known = pairs.filter_map(|(a, b)| Some((table[b][a]?, (Reverse(b), Reverse(a)))));
-        let Some((_, (Reverse(b), Reverse(a)))) = known.max() else { break };
+    let mut pairs = BinaryHeap::new();
+    let pair = |parts: &[Option<Part>], changes: &[u32], a: usize, b: usize| {
+        let saved = parts[a].as_ref()?.saved_with(parts[b].as_ref()?, works)?;
+        Some((saved, Reverse(b), Reverse(a), [changes[a], changes[b]]))
+    };
+    for b in 0..parts.len() {
+        pairs.extend((0..b).filter_map(|a| pair(&parts, &changes, a, b)));
+    }
+    while let Some((_, Reverse(b), Reverse(a), told)) = pairs.pop() {
+        if told != [changes[a], changes[b]] {
+            continue;
+        }
         let other = parts[b].take();
         parts[a] = parts[a].as_ref().zip(other.as_ref()).map(|(part, other)| part.with(other, works));
-        for i in (0..parts.len()).filter(|i| *i != a && *i != b) {
-            table[a.max(i)][a.min(i)] = saved(&parts, a.min(i), a.max(i));
-            table[b.max(i)][b.min(i)] = None;
-        }
-        table[b][a] = None;
+        [a, b].into_iter().for_each(|i| changes[i] += 1);
+        let others = (0..parts.len()).filter(|i| *i != a);
+        pairs.extend(others.filter_map(|i| pair(&parts, &changes, a.min(i), a.max(i))));
     }
     parts.into_iter().flatten().collect()
 }
@@ -105,10 +115,7 @@ impl Beside {
         }
         let program = plan.program;
         let groups = plan.column_groups();
-        let (parts, left) = parts_of(program, rates, &groups)?;
-        if left > MOST_LEFT {
-            return None;
-        }
+        let parts = parts_of(program, rates, &groups)?;
         let states =
             |part: &Part| part.groups.iter().flat_map(|&group| groups[group].iter().copied()).collect::<Vec<_>>();
         let found: Vec<_> =
@@ -144,27 +151,42 @@ impl Beside {
     }
 }
 
-/// Groups of columns in parts, each with whether code of its own is written for it, and the part of all operations that this leaves.
-fn parts_of(program: &Program, rates: &Routine, groups: &[Vec<usize>]) -> Option<(Vec<(Part, bool)>, f64)> {
-    // Kinds of work: by which groups move it.
-    let moved: Vec<Vec<bool>> = groups.iter().map(|states| program.moved_by_states(states)).collect();
+/// Groups of columns in parts, each with whether code of its own is written for it; none where that leaves too much of all operations.
+fn parts_of(program: &Program, rates: &Routine, groups: &[Vec<usize>]) -> Option<Vec<(Part, bool)>> {
+    // By which groups each step is moved.
+    let mut moved = vec![vec![false; groups.len()]; rates.code.steps.len()];
+    for (group, states) in groups.iter().enumerate() {
+        let moves = program.moved_by_states(states);
+        let is_moved = |out: &Local| rates.code.values[out.0 as usize].is_some_and(|value| moves[value.index()]);
+        for (step, by) in rates.code.steps.iter().zip(&mut moved) {
+            by[group] = step.defines().iter().any(is_moved);
+        }
+    }
+    // Kinds of work: what the same groups move.
     let mut kinds: BTreeMap<Vec<bool>, u64> = BTreeMap::new();
-    for step in &rates.code.steps {
-        let values: Vec<Value> = step.defines().iter().filter_map(|out| rates.code.values[out.0 as usize]).collect();
-        let by = moved.iter().map(|moved| values.iter().any(|v| moved[v.index()])).collect();
+    for (step, by) in rates.code.steps.iter().zip(moved) {
         *kinds.entry(by).or_default() += weight(program, step);
     }
-    let works: Vec<u64> = kinds.values().copied().collect();
-    let all: u64 = works.iter().sum();
-    let own = |group: usize| Part::of(vec![group], kinds.keys().map(|by| by[group]).collect(), &works);
+    let all: u64 = kinds.values().sum();
+    // Sums of them are no more.
+    u32::try_from(all).ok()?;
+    let works: Vec<u32> = kinds.values().map(|work| *work as u32).collect();
+    let asked = |group: usize| kinds.keys().map(|by| if by[group] { u32::MAX } else { 0 }).collect();
+    let own = |group: usize| Part::of(vec![group], asked(group), &works);
+    let left = |work: u64| work as f64 / (all * groups.len() as u64) as f64;
+    let apart: Vec<Part> = (0..groups.len()).map(own).collect();
+    // Put together they take no less.
+    if all == 0 || left(apart.iter().map(|part| part.work).sum()) > MOST_LEFT {
+        return None;
+    }
     let is_written = |part: &Part| part.price() < all * part.groups.len() as u64;
-    let parts = put_together((0..groups.len()).map(own).collect(), &works);
+    let parts = put_together(apart, &works);
     let parts: Vec<(Part, bool)> = parts.into_iter().map(|part| (part.clone(), is_written(&part))).collect();
     let work: u64 = parts
         .iter()
         .map(|(part, is_written)| part.groups.len() as u64 * if *is_written { part.work } else { all })
         .sum();
-    (all > 0).then(|| (parts, work as f64 / (all * groups.len() as u64) as f64))
+    (left(work) <= MOST_LEFT).then_some(parts)
 }
 
 /// What a step takes, for an estimate.
