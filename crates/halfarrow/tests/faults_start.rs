@@ -658,3 +658,43 @@ fn a_leaning_four_bar_starts() {
         }
     }
 }
+
+/// A bridge of four exponential diodes, from a few volts to where all exponentials overflow while nothing is known yet: at rest at
+/// once, or with a capacitor that has yet to be charged. Those that block carry their saturation current to rounding, and their law
+/// is never asked which voltage belongs to that.
+#[test]
+fn bridges_of_diodes_start_at_any_voltage() {
+    let (is, vt, rs, rl) = (1e-9, 25e-3, 10.0, 1e3);
+    let bridge = |v0: f64, beside: &str| {
+        format!(
+            "model Bridge
+            param is = {is}, vt = {vt}, v0 = {v0}
+            component Diode(port from, to) {{
+              from -> 1:through -> to
+              through -> R:junction(f = is*(exp(e/vt) - 1))
+            }}
+            Diode:d1; Diode:d2; Diode:d3; Diode:d4
+            Se:mains(v0) -> 1:feed -> 0:left; feed -> R:Rs({rs}); 0:right -> feed
+            0:minus -> d3.from; d3.to -> left; left -> d1.from; d1.to -> 0:plus
+            minus -> d4.from; d4.to -> right; right -> d2.from; d2.to -> plus
+            plus -> 1:out -> minus; out -> 0:load -> R:Rl({rl}); Se:ground(0) -> minus{beside}"
+        )
+        .replace("; ", "\n")
+    };
+    for v0 in [4.0, 6.0, 12.0, 24.0, 60.0, 110.0, 230.0, 311.0, 690.0f64] {
+        let mut i = v0 / (rs + rl);
+        for _ in 0..50 {
+            let left = rs * (i + is) + 2.0 * vt * (i / is + 1.0).ln() + rl * (i - is) - v0;
+            i -= left / (rs + rl + 2.0 * vt / (i + is));
+        }
+        for form in [Form::Minimal, Form::Kane, Form::Lagrange] {
+            for way in [v0, -v0] {
+                let found = start_of(&model(&bridge(way, "")), form, Start::Given);
+                near(&format!("{form:?} {way}"), found["Rl.e"], rl * (i - is));
+                let found = start_of(&model(&bridge(way, "; load -> C:filter(10e-6)")), form, Start::Given);
+                near(&format!("{form:?} {way}"), found["Rl.e"], 0.0);
+                assert!(found["Rs.f"].abs() > 0.9 * (v0 - 2.0) / rs, "{form:?} {way}: {}", found["Rs.f"]);
+            }
+        }
+    }
+}

@@ -256,7 +256,7 @@ fn order_equations(
         conditions.extend(free);
     }
     let guesses = if own_start { observed::guesses(&mut d) } else { Vec::new() };
-    let domains = domains::domains(&mut d, &states);
+    let domains = domains::domains(&mut d, &states, &ordered.steps);
     let implicit = ordered.steps.iter().flat_map(|s| match s {
         EquationStep::Newton(block) => block.unknowns.clone(),
         _ => Vec::new(),

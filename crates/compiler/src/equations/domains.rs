@@ -1,17 +1,25 @@
 //! Where laws have a value: what a logarithm, a root or a table may be asked for.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::blocks::elements_of;
 use super::definitions::{Definition, Definitions};
-use super::{DomainKind, LawDomain, State};
+use super::{DomainKind, EquationStep, LawDomain, State};
 use crate::algebra::{Expr, Exprs, Function, Node, Outside, Symbol};
 use crate::bond_graph::Meaning;
 
 /// The domains of all that is defined, in the order of the symbols. A law that was inverted has one wherever its values
-/// do not reach everywhere: `f = is*(exp(e/vt) - 1)` gives `e` only for `f` above `-is`.
-pub fn domains(d: &mut Definitions, states: &[State]) -> Vec<LawDomain> {
+/// do not reach everywhere: `f = is*(exp(e/vt) - 1)` gives `e` only for `f` above `-is`. What is iterated for has none but those
+/// of the equations that are iterated: a current that is `-is` to rounding asks nothing of a law that is never inverted.
+pub fn domains(d: &mut Definitions, states: &[State], steps: &[EquationStep]) -> Vec<LawDomain> {
     let mut all = Vec::new();
+    let mut iterated: BTreeMap<Symbol, BTreeSet<Expr>> = BTreeMap::new();
+    for step in steps {
+        let EquationStep::Newton(block) = step else { continue };
+        let inside = block.body.iter().map(|(_, value)| *value).chain(block.residuals.iter().copied());
+        let asked: BTreeSet<Expr> = inside.flat_map(|e| partial_parts(&d.x, e)).map(|(argument, _)| argument).collect();
+        iterated.extend(block.unknowns.iter().map(|&unknown| (unknown, asked.clone())));
+    }
     let states: BTreeSet<Symbol> = states.iter().map(|s| s.symbol).collect();
     let explicit: Vec<(Symbol, Expr)> =
         d.of.iter().filter_map(|(&s, d)| if let Definition::Explicit(e) = d { Some((s, *e)) } else { None }).collect();
@@ -22,7 +30,11 @@ pub fn domains(d: &mut Definitions, states: &[State]) -> Vec<LawDomain> {
         let of_an_element =
             matches!(d.meaning(symbol), Some(Meaning::Effort(_) | Meaning::Flow(_) | Meaning::Stored(_)));
         let elements = if of_an_element { elements_of(d, &[symbol]) } else { Vec::new() };
+        let iterated = iterated.get(&symbol);
         for (argument, kind) in partial_parts(&d.x, value) {
+            if iterated.is_some_and(|asked| !asked.contains(&argument)) {
+                continue;
+            }
             let asked = asked(d, argument);
             let limit = asked.and_then(|asked| limit(d, argument, kind, asked));
             all.push(LawDomain { symbol, elements: elements.clone(), argument, kind, asked, limit });

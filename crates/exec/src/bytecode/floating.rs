@@ -29,11 +29,11 @@ const NULL_SPACE_COMPONENT: f64 = 0.1;
 #[derive(Debug, Clone)]
 pub(crate) struct Floating {
     /// Bounds on the rounding errors of the residuals.
-    rounding: Vec<f64>,
+    pub(super) rounding: Vec<f64>,
     /// The linear equations of a step, in scaled unknowns.
-    equations: RankRevealing,
+    pub(super) equations: RankRevealing,
     /// Scales of the unknowns.
-    scale: Vec<f64>,
+    pub(super) scale: Vec<f64>,
     /// Which unknowns float at the solution found last.
     pub now: Vec<bool>,
     /// Which have floated in an accepted solution.

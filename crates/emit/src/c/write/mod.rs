@@ -247,8 +247,10 @@ impl<'a> Writer<'a> {
         if !f.kept.contains_key(&out) {
             return;
         }
-        let of = |step: &Step| f.kept[&step.defines()[0].0];
-        let all: Vec<Value> = f.turns_of(f.definition[out as usize]).map(of).collect();
+        let at = f.definition[out as usize];
+        let Some(which) = f.code.steps[at].defines().iter().position(|own| own.0 == out) else { return };
+        let of = |step: &Step| f.kept[&step.defines()[which].0];
+        let all: Vec<Value> = f.turns_of(at).map(of).collect();
         let a = Arg::Local(Local(out));
         let place = self.series(f, all.iter().map(|&given| (self.givens.spot(given), false)).collect(), false);
         let value = self.arg(f, a, false);

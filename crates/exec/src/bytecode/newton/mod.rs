@@ -16,7 +16,8 @@
 //! 3. [`rounding`]: the previous solution may still be a root to rounding; also `floating`, for unknowns that no equation
 //!    determines.
 //! 4. [`continuation`]: if not, a path of roots is followed, its step length doubled and halved.
-//! 5. [`search`], [`scan`]: at the start and after events, iterations from other points.
+//! 5. [`search`], [`scan`], [`least_norm`]: at the start and after events, iterations from other points, and from where
+//!    rounding hides some of the equations.
 //!
 //! [`positions`] that constraints determine go where their motion leads. [`nonsmooth`] is for laws whose derivative jumps.
 //!
@@ -26,6 +27,7 @@
 mod continuation;
 mod correction;
 mod damped;
+mod least_norm;
 mod nonsmooth;
 mod path;
 mod positions;

@@ -7,6 +7,10 @@ use crate::bytecode::instruction::Solve;
 
 /// First guesses after the previous solution and zero, at the start and after events.
 const OTHER_STARTS: [f64; 6] = [1e-3, -1e-3, 1.0, -1.0, 1e3, -1e3];
+/// Where the laws have no value at any of these: magnitudes of one unknown from 1 on, by this factor, and of pairs.
+const STEP_APART: f64 = 1.05;
+const FARTHEST: f64 = 1e4;
+const STARTS_APART: [f64; 10] = [1.0, 3.0, 10.0, 20.0, 40.0, 70.0, 100.0, 200.0, 400.0, 1e3];
 
 /// Why the continuation of the previous solution was not found.
 #[derive(Debug, Clone, Copy)]
@@ -201,7 +205,7 @@ impl Frame {
                 return true;
             }
         }
-        if n > 1 && !self.newton_of(solve).valued && self.search_in_pairs(solve) {
+        if n > 1 && !self.newton_of(solve).valued && self.search_apart(solve) {
             return true;
         }
         self.newton_of(solve).floating.now.fill(false);
@@ -210,29 +214,45 @@ impl Frame {
 
     /// A root by an iteration from the start that is set.
     fn search_from(&mut self, solve: &Solve) -> bool {
-        self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve)
+        self.iterate(solve, Globalization::Damped).is_ok()
+            || self.solve_rank_deficient(solve)
+            || self.iterate_by_least_norm(solve)
     }
 
-    /// Where the laws have no value at any of the starts so far, as an exponential that overflows: one or two unknowns
-    /// elsewhere, the others 0, on up to half the evaluations.
-    fn search_in_pairs(&mut self, solve: &Solve) -> bool {
+    /// Where the laws have no value at any of the starts so far, as an exponential that overflows: one unknown elsewhere, in
+    /// small steps, then two of them, the others 0, on up to half the evaluations.
+    fn search_apart(&mut self, solve: &Solve) -> bool {
         let n = solve.right.len();
-        for (one, other) in (0..n).flat_map(|one| (one..n).map(move |other| (one, other))) {
-            let others = if other == one { 1 } else { OTHER_STARTS.len() };
-            for (i, j) in (0..OTHER_STARTS.len()).flat_map(|i| (0..others).map(move |j| (i, j))) {
-                let newton = self.newton_of(solve);
-                if newton.evaluations > newton.limit() / 2 {
-                    return false;
+        for one in 0..n {
+            let mut distance = 1.0;
+            while distance < FARTHEST {
+                if [distance, -distance].into_iter().any(|way| self.search_at(solve, (one, way), (one, way))) {
+                    return true;
                 }
-                newton.start.fill(0.0);
-                newton.start[other] = OTHER_STARTS[j];
-                newton.start[one] = OTHER_STARTS[i];
-                if self.search_from(solve) {
+                distance *= STEP_APART;
+            }
+        }
+        let starts = || STARTS_APART.into_iter().flat_map(|start| [start, -start]);
+        for (one, other) in (0..n).flat_map(|one| (one + 1..n).map(move |other| (one, other))) {
+            for (way, beside) in starts().flat_map(|way| starts().map(move |beside| (way, beside))) {
+                if self.search_at(solve, (one, way), (other, beside)) {
                     return true;
                 }
             }
         }
         false
+    }
+
+    /// The same from where all unknowns but these are 0.
+    fn search_at(&mut self, solve: &Solve, one: (usize, f64), other: (usize, f64)) -> bool {
+        let newton = self.newton_of(solve);
+        if newton.evaluations > newton.limit() / 2 {
+            return false;
+        }
+        newton.start.fill(0.0);
+        [other, one].into_iter().for_each(|(unknown, way)| newton.start[unknown] = way);
+        newton.trial.copy_from_slice(&newton.start);
+        self.evaluate(solve, true) && self.search_from(solve)
     }
 }
 

@@ -84,33 +84,156 @@ static int ha_scan(ha_model *m, ha_newton *w)
 }
 
 //end
+//item ha_left_of_equations
+/* The greatest residual at the point evaluated last, by the magnitudes of their rows where they were balanced last. */
+static $real ha_left_of_equations(const ha_newton *w)
+{
+    $real most = $0.0;
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        most = $ha_greatest(most, $fabs(w->right[i] - w->offset[i]) / w->terms[i]);
+    }
+    return most;
+}
+
+//item ha_balance
+/* The linearised equations at the point evaluated last: rows and columns with greatest entries of 1, in units of what is
+ * rounding. */
+static void ha_balance(ha_newton *w)
+{
+    const int n = w->n;
+    $real *rows = w->terms;
+    $real *most = w->simplified;
+    int round;
+    int i;
+    int e;
+    for (i = 0; i < n; ++i) {
+        w->units[i] = $1.0;
+        w->order[i] = ($real)i;
+    }
+    for (round = 0; round < 3; ++round) {
+        $ha_fill(most, $0.0, n);
+        for (i = 0; i < n; ++i) {
+            rows[i] = $0.0;
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                rows[i] = $ha_greatest(rows[i], $fabs(w->matrix[e]) * w->units[w->columns[e]]);
+            }
+            if (rows[i] == $0.0) {
+                rows[i] = $1.0;
+            }
+            for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+                const int j = w->columns[e];
+                most[j] = $ha_greatest(most[j], $fabs(w->matrix[e]) / rows[i]);
+            }
+        }
+        for (i = 0; i < n; ++i) {
+            if (most[i] > $0.0) {
+                w->units[i] = $1.0 / most[i];
+            }
+        }
+    }
+    $ha_fill(w->loose, $0.0, n * n);
+    for (i = 0; i < n; ++i) {
+        w->rest[i] = (w->offset[i] - w->right[i]) / rows[i] / ($4096.0 * $DBL_EPSILON);
+        for (e = w->starts[i]; e < w->starts[i + 1]; ++e) {
+            w->loose[i * n + w->columns[e]] = w->matrix[e] * w->units[w->columns[e]] / rows[i] / ($4096.0 * $DBL_EPSILON);
+        }
+    }
+}
+
+//item ha_iterate_by_least_norm
+/* Steps of least norm from w->start to where the equations tell all unknowns, and the damped iteration from there: far up an
+ * exponential law what other equations say is lost in its rounding. */
+static int ha_iterate_by_least_norm(ha_model *m, ha_newton *w)
+{
+    const int n = w->n;
+    int step;
+    int i;
+    $ha_copy(w->x, w->start, n);
+    if (n == 1 || w->loose == NULL || !$ha_evaluate(m, w, w->x)) {
+        return 0;
+    }
+    for (step = 0; step < 2000; ++step) {
+        $real damping = $1.0;
+        $real before;
+        int rank;
+        int found = 0;
+        $ha_balance(w);
+        rank = $ha_eliminate(w);
+        if (rank == n) {
+            $ha_copy(w->start, w->x, n);
+            return step > 0 && $ha_iterate(m, w, HA_DAMPED);
+        }
+        before = $ha_left_of_equations(w);
+        $ha_shortest(w, rank);
+        for (i = 0; i < n; ++i) {
+            const int unknown = (int)w->order[i];
+            w->correction[unknown] = w->rest[i] * w->units[unknown];
+        }
+        while (!found && damping >= $1e-6 && w->evaluations < w->limit) {
+            for (i = 0; i < n; ++i) {
+                const $real move = damping * w->correction[i];
+                w->trial[i] = w->x[i] + move;
+            }
+            found = $ha_evaluate(m, w, w->trial) && $ha_left_of_equations(w) < before;
+            damping *= $0.5;
+        }
+        if (!found) {
+            return 0;
+        }
+        $ha_accept_trial(w);
+    }
+    return 0;
+}
+
 //item ha_search_from
 /* A root by an iteration that begins at w->start. */
 static int ha_search_from(ha_model *m, ha_newton *w)
 {
-    return $ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w);
+    return $ha_iterate(m, w, HA_DAMPED) || $ha_floats(m, w) || $ha_iterate_by_least_norm(m, w);
 }
 
-//item ha_search_in_pairs
-/* Where the laws have no value at any of the starts so far, as an exponential that overflows: one or two unknowns elsewhere,
- * the others 0, on up to half the evaluations. */
-static int ha_search_in_pairs(ha_model *m, ha_newton *w, const $real *starts, int count)
+//item ha_search_at
+/* The same from where all unknowns but these are 0, on up to half the evaluations. */
+static int ha_search_at(ha_model *m, ha_newton *w, int one, $real way, int other, $real beside)
 {
+    if (w->evaluations > w->limit / 2) {
+        return 0;
+    }
+    $ha_fill(w->start, $0.0, w->n);
+    w->start[other] = beside;
+    w->start[one] = way;
+    $ha_copy(w->trial, w->start, w->n);
+    return $ha_evaluate(m, w, w->trial) && $ha_search_from(m, w);
+}
+
+//item ha_search_apart
+/* Where the laws have no value at any of the starts so far, as an exponential that overflows: one unknown elsewhere, in small
+ * steps, then two of them. */
+static int ha_search_apart(ha_model *m, ha_newton *w)
+{
+    static const $real starts[] = {$1.0, $3.0, $10.0, $20.0, $40.0, $70.0, $100.0, $200.0, $400.0, $1e3};
+    const int count = 2 * (int)(sizeof starts / sizeof starts[0]);
     int one;
     int other;
     int i;
     int j;
     for (one = 0; one < w->n; ++one) {
-        for (other = one; other < w->n; ++other) {
+        $real distance = $1.0;
+        while (distance < $1e4) {
+            if ($ha_search_at(m, w, one, distance, one, distance) || $ha_search_at(m, w, one, -distance, one, -distance)) {
+                return 1;
+            }
+            distance *= $1.05;
+        }
+    }
+    for (one = 0; one < w->n; ++one) {
+        for (other = one + 1; other < w->n; ++other) {
             for (i = 0; i < count; ++i) {
-                for (j = 0; j < (other == one ? 1 : count); ++j) {
-                    if (w->evaluations > w->limit / 2) {
-                        return 0;
-                    }
-                    $ha_fill(w->start, $0.0, w->n);
-                    w->start[other] = starts[j];
-                    w->start[one] = starts[i];
-                    if ($ha_search_from(m, w)) {
+                for (j = 0; j < count; ++j) {
+                    const $real way = i % 2 == 0 ? starts[i / 2] : -starts[i / 2];
+                    const $real beside = j % 2 == 0 ? starts[j / 2] : -starts[j / 2];
+                    if ($ha_search_at(m, w, one, way, other, beside)) {
                         return 1;
                     }
                 }
@@ -147,7 +270,7 @@ static int ha_search(ha_model *m, ha_newton *w)
             return 1;
         }
     }
-    if (!w->valued && w->n > 1 && $ha_search_in_pairs(m, w, starts + 1, 6)) {
+    if (!w->valued && w->n > 1 && $ha_search_apart(m, w)) {
         return 1;
     }
 //if newton_single
