@@ -128,6 +128,18 @@ fn signals_end_runs_in_order() {
     assert!(report["ticks"].as_u64() > Some(0) && report["error"].as_str().unwrap().contains("as asked"), "{report}");
 }
 
+/// Where nobody listens for a while, as before a run has begun, a signal ends the program nevertheless.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_signal_ends_what_takes_long_before_a_run() {
+    let here = folder("long");
+    let family = ["new", "--family", "fourbars", "long", "640"];
+    assert!(command(&here, &family).output().unwrap().status.success());
+    let output = stopped(&here, &["simulate", "long.bond", "--to", "1"], SIGNALS[1]);
+    assert_eq!(output.status.code(), Some(128 + 15), "{}", stderr(&output));
+    assert!(stderr(&output).contains("ended as asked, before there was a result"), "{}", stderr(&output));
+}
+
 #[test]
 #[cfg(target_os = "linux")]
 fn a_sweep_keeps_others_away_and_goes_on_after_a_signal() {

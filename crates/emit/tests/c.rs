@@ -46,6 +46,7 @@ fn c_follows_parameters_and_inputs() {
         (own("closure"), "coupler0", 1.0),
         (own("working_point"), "k", 0.4),
         (own("operating_points"), "v0", 12.0),
+        (own("flat_start"), "p", 2.84),
         (own("freedom"), "v", -1.5),
         (own("when_bounce"), "e", 0.9),
         (own("when_beam"), "ratio", 0.4),

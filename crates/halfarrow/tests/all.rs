@@ -102,3 +102,5 @@ mod vehicles;
 mod velocity;
 #[path = "velocity_many.rs"]
 mod velocity_many;
+#[path = "wild_graphs.rs"]
+mod wild_graphs;

@@ -698,3 +698,37 @@ fn bridges_of_diodes_start_at_any_voltage() {
         }
     }
 }
+
+/// Nets of pipes whose laws are written by what drives the flow, with an infinite slope at rest, are the same as nets written the
+/// other way round.
+#[test]
+fn nets_of_orifices_start_as_nets_of_pipes_do() {
+    for seed in 1..=12u64 {
+        let mut state = seed;
+        let mut real = |low: f64, high: f64| low + (high - low) * 0.5 * (1.0 + next(&mut state));
+        let nodes = 4 + (seed % 6) as usize;
+        let mut lines = vec!["model Net\nSe:feed(5e5) -> 0:n0".to_string()];
+        lines.extend((1..nodes).map(|i| format!("0:n{i}\nSf:take{i}({}) -> n{i}", real(-1e-3, 2e-4))));
+        let mut pipes = Vec::new();
+        for i in 1..nodes {
+            for from in 0..i {
+                if from + 1 == i || real(0.0, 1.0) < 0.6 {
+                    pipes.push((from, i, real(1e-6, 1e-5)));
+                }
+            }
+        }
+        let net = |law: &dyn Fn(f64) -> String| {
+            let pipes = pipes
+                .iter()
+                .enumerate()
+                .map(|(k, &(from, to, g))| format!("n{from} -> 1:p{k} -> n{to}\np{k} -> R:r{k}({})", law(g)));
+            lines.iter().cloned().chain(pipes).collect::<Vec<_>>().join("\n")
+        };
+        let [orifices, inverse] =
+            [net(&|g| format!("f = {g}*sqrt(abs(e))*sign(e)")), net(&|g| format!("e = {}*f*abs(f)", 1.0 / (g * g)))]
+                .map(|text| start_of(&model(&text), Form::Minimal, Start::Given));
+        for i in 1..nodes {
+            near(&format!("n{i} of {seed}"), orifices[&format!("n{i}.e")], inverse[&format!("n{i}.e")]);
+        }
+    }
+}

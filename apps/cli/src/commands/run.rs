@@ -1,7 +1,6 @@
 //! `simulate`.
 
 use std::path::Path;
-use std::sync::atomic::Ordering::Relaxed;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Gradient, Method, Model, Problem,
@@ -18,7 +17,7 @@ use super::with_model;
 use crate::arguments::{self, Exec, Simulate, Solver};
 use crate::page::Page;
 use crate::screen::{self, Progress};
-use crate::stop;
+use crate::stop::Listener;
 
 /// A trajectory.
 pub fn simulate(arguments: &Simulate) -> u8 {
@@ -29,7 +28,7 @@ pub fn simulate(arguments: &Simulate) -> u8 {
         }
         let (run, own) = animation::filmed(arguments, model, run(arguments))?;
         let mut progress = Progress::new(arguments.to);
-        let stop = stop::on_signals();
+        let stop = Listener::new();
         let mut told: Vec<String> = Vec::new();
         let mut reach = |come: halfarrow::Progress<'_>| {
             if let Some(note) = come.note {
@@ -37,12 +36,13 @@ pub fn simulate(arguments: &Simulate) -> u8 {
                 told.push(note.to_string());
             }
             progress.reach(come.time);
-            !stop.load(Relaxed)
+            !stop.is_asked()
         };
         let outcome = match &arguments.gradient {
             None => model.simulate(&run, &mut reach).map(|done| (done, None)),
             Some(number) => gradient(model, &run, number, &mut reach),
         };
+        stop.over();
         progress.finish();
         match outcome {
             Ok((mut done, gradient)) => {

@@ -159,6 +159,11 @@ fn block(
     first: &BTreeSet<Symbol>,
     ordered: &mut Ordered,
 ) -> Result<(), Insoluble> {
+    for &symbol in &symbols {
+        if let Some(&residual) = d.gentle.get(&symbol) {
+            d.of.insert(symbol, Definition::Implicit(residual));
+        }
+    }
     let torn = tear(d, &symbols, first);
     let rest: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
     let body: Vec<(Symbol, Expr)> = components(d, &rest).into_iter().map(|c| (c[0], d.of[&c[0]].expr())).collect();

@@ -2,8 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::FxHashMap;
+
 use super::Unavailable;
-use crate::algebra::{Expr, Exprs, Symbol, ZERO};
+use super::points::{ROUNDING, somewhere};
+use crate::algebra::{Evaluator, Expr, Exprs, Symbol, ZERO};
 use crate::bond_graph::{BondGraph, HeldKind, Meaning};
 use crate::ids::Map;
 
@@ -43,6 +46,9 @@ pub struct Definitions<'a> {
     pub of: Map<Symbol, Definition>,
     /// What nonlinear laws make vanish, as written, for variables whose definition is the inverted law.
     pub written: Map<Symbol, Expr>,
+    /// What laws make vanish that are steep as written, such as that of an orifice at rest, and are not the other way round: for
+    /// the variables that they give.
+    pub gentle: Map<Symbol, Expr>,
     /// States with the symbols of their rates.
     pub states: Map<Symbol, Symbol>,
     /// Stored quantities with the symbols of their rates, which the bonds carry.
@@ -74,6 +80,7 @@ impl<'a> Definitions<'a> {
             graph,
             of,
             written: Map::new(),
+            gentle: Map::new(),
             states: Map::new(),
             stored: Map::new(),
             constants: BTreeSet::new(),
@@ -98,7 +105,10 @@ impl<'a> Definitions<'a> {
         let definition = match self.solve_for(residual, symbol) {
             Some(value) => {
                 let plain = self.x.is_plainly_linear(residual, symbol);
-                if !plain && self.x.linear_in(residual, &[symbol]).is_none() {
+                if !plain
+                    && self.x.linear_in(residual, &[symbol]).is_none()
+                    && !self.is_gentler(residual, (symbol, value))
+                {
                     self.written.insert(symbol, residual);
                 }
                 Definition::Explicit(value)
@@ -106,6 +116,39 @@ impl<'a> Definitions<'a> {
             None => Definition::Implicit(residual),
         };
         self.of.insert(symbol, definition);
+    }
+
+    /// Defines a symbol by the law of an element as it is written, which reads `asked`. Where that is steep and the other way round
+    /// it is not, loops go by the latter.
+    pub fn set_law(&mut self, symbol: Symbol, law: Expr, asked: Symbol) {
+        self.set(symbol, law);
+        if !self.x.is_steep(law) {
+            return;
+        }
+        let own = self.x.sym(symbol);
+        let residual = self.x.sub(own, law);
+        let Some(inverse) = self.solve_for(residual, asked) else { return };
+        if self.is_gentler(residual, (asked, inverse)) {
+            let asked = self.x.sym(asked);
+            let residual = self.x.sub(asked, inverse);
+            self.gentle.insert(symbol, residual);
+        }
+    }
+
+    /// Whether an expression that is steep vanishes wherever a symbol has this value, which is not steep and has no end: told at
+    /// points on either side of 0, large and small, since laws of both signs have corners.
+    fn is_gentler(&mut self, steep: Expr, (symbol, value): (Symbol, Expr)) -> bool {
+        if !self.x.is_steep(steep) || self.x.is_steep(value) || !self.x.total(value) {
+            return false;
+        }
+        let left = self.x.substitute(steep, &BTreeMap::from([(symbol, value)]));
+        let (signs, sizes) = ([1.0, -1.0], [1e-3, 1.0, 30.0]);
+        signs.iter().flat_map(|sign| sizes.map(|size| sign * size)).enumerate().all(|(point, size)| {
+            let is_parameter = |s: Symbol| matches!(self.meaning(s), Some(Meaning::Parameter(_)));
+            let mut at = |s: Symbol| somewhere(point, s) * if is_parameter(s) { 1.0 } else { size };
+            let left = Evaluator::knowing(&self.x, &mut at, FxHashMap::default()).value(left);
+            left.abs() <= ROUNDING * size.abs()
+        })
     }
 
     /// The root of an expression, if it can be written down without dividing by what may vanish.

@@ -226,7 +226,7 @@ impl<'a> Assembled<'a> {
         let (given, law, written) = residual;
         let law = self.own(causal, state, law);
         if written == causality {
-            return self.d.set(state.input, law);
+            return self.d.set_law(state.input, law, state.output);
         }
         // Written the other way round: the law gives what the junction structure gives too.
         let given = self.d.x.sym(given);

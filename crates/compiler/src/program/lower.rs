@@ -330,13 +330,18 @@ impl<'a> Lowering<'a> {
         let small = self.exprs.is_number(exponent).and_then(|n| n.small());
         let value = match small {
             Some((n, 1)) if n.unsigned_abs() <= 64 => self.powi(a, n.unsigned_abs() as u32),
-            Some((1 | -1, 2)) => self.op(Op::Call(Function::Sqrt, a)),
+            Some((1 | -1, 2)) => {
+                let a = self.rooted(base, a);
+                self.op(Op::Call(Function::Sqrt, a))
+            }
             Some((3 | -3, 2)) => {
+                let a = self.rooted(base, a);
                 let root = self.op(Op::Call(Function::Sqrt, a));
                 self.mul(a, root)
             }
             _ => {
                 let b = self.known(exponent).expect("parts stand before wholes");
+                let a = self.rooted(base, a);
                 let value = self.op(Op::Pow(a, b));
                 return (Some(value), None);
             }
@@ -345,6 +350,14 @@ impl<'a> Lowering<'a> {
             Some((n, _)) if n < 0 => (None, Some(value)),
             _ => (Some(value), None),
         }
+    }
+
+    /// What a root is taken of. What is never below 0, as `abs(e)` and `max(e, 0)`, is so by rounding where a side of them is held
+    /// and time alone has come to where the other one begins. Steps of states that go further are to have no value there.
+    fn rooted(&mut self, base: Expr, a: Value) -> Value {
+        let timed = self.holds(a) && !self.values.reads(a).includes(Reads::STATE);
+        let may_be_below = timed && self.exprs.nonnegative(base) && !self.exprs.corners(base).is_empty();
+        if may_be_below { self.op(Op::Call(Function::Abs, a)) } else { a }
     }
 
     fn call(&mut self, f: Function, a: Value, b: Option<Value>) -> Value {

@@ -549,6 +549,14 @@ impl Block {
             Block::Newton { residuals, .. } => residuals.len(),
         }
     }
+    /// What its solution depends on where its equations read so much: one that is iterated for and moves follows the one before,
+    /// and is not to be had at any time that is asked for.
+    pub fn reads_of_solution(&self, reads: Reads) -> Reads {
+        match self {
+            Block::Newton { .. } if reads != Reads::PARAMETERS => reads.with(Reads::STATE),
+            _ => reads,
+        }
+    }
     /// Its matrix, or that of the derivatives of its residuals.
     pub fn matrix(&self) -> &Arc<Matrix> {
         let (Block::Linear { matrix, .. } | Block::Newton { jacobian: matrix, .. }) = self;

@@ -265,8 +265,9 @@ impl Schedule<'_> {
         let from_start = unknowns.iter().any(|s| self.positions.contains(s));
         let least = if from_start { Reads::STATE } else { Reads::PARAMETERS };
         let reads = self.blocks[block].reads().fold(least, |all, v| all.with(values.reads(v)));
+        let reads = self.blocks[block].reads_of_solution(reads.without(Reads::GUESS));
         for (i, &symbol) in unknowns.iter().enumerate() {
-            let value = self.lower.values.add(Op::Solution(block, i as u32), reads.without(Reads::GUESS));
+            let value = self.lower.values.add(Op::Solution(block, i as u32), reads);
             self.lower.define(symbol, value);
         }
     }

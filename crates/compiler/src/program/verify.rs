@@ -42,7 +42,7 @@ fn values(p: &Program) -> Result<(), String> {
         if let Op::Solution(block, _) = op {
             all(block.index() < p.blocks.len(), || format!("{value:?} is an unknown of no block"))?;
             p.blocks[block].reads().for_each(&mut visit);
-            reads = reads.without(Reads::GUESS);
+            reads = p.blocks[block].reads_of_solution(reads.without(Reads::GUESS));
             if p.positions.iter().any(|position| position.block == block) {
                 reads = reads.with(Reads::STATE);
             }

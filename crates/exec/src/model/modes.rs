@@ -194,7 +194,9 @@ impl Model {
         let all = self.combinations(most)?;
         let present: Vec<u32> = self.code.program.branches();
         let others = all.iter().filter(|branches| **branches != present);
-        let point = self.values_of_all(t, x).unwrap_or_default();
+        // Models of one mode keep no place for all variables.
+        let changes = all.len() > 1 || self.code.exchanges.is_some();
+        let point = if changes { self.values_of_all(t, x).unwrap_or_default() } else { BTreeMap::new() };
         let mut modes = Vec::new();
         for branches in std::iter::once(&present).chain(others) {
             let Some(first) = self.compiled.in_mode(branches) else { continue };

@@ -99,6 +99,8 @@ pub(crate) struct Radau {
     wanted: Option<Vec<f64>>,
     dy: Vec<f64>,
     dyp: Vec<f64>,
+    /// For each equation how much the values allowed of its unknowns, and the rates of these, make of it in a step.
+    rates_of_change: Vec<[f64; 2]>,
     /// Whether rates are known to enter linearly.
     linear_in_rates: bool,
     /// Whether the first step goes along the rates at its start.
@@ -159,6 +161,7 @@ impl Radau {
             error: vector(),
             allowed: vector(),
             wanted: (0..size).any(|unknown| system.index(unknown) > 1).then(vector),
+            rates_of_change: vec![[0.0; 2]; size],
             dy: vec![0.0; nonzeros],
             dyp: vec![0.0; nonzeros],
             linear_in_rates: system.semi_explicit().is_some(),

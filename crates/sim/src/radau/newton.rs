@@ -1,7 +1,7 @@
 //! Simplified Newton for the increments of a step. Source: [HW], IV.8.
 
 use super::tableau::{BACK, NODES, STAGES, TRANSFORM};
-use super::{Radau, StepError, norm};
+use super::{Radau, STEEP, StepError, norm};
 use crate::{Affected, Failure, ImplicitSystem};
 
 /// Iterations at most.
@@ -9,6 +9,9 @@ pub(super) const MOST_ITERATIONS: usize = 7;
 
 /// Factor from one correction to the next beyond which rounding keeps Newton from getting where it should.
 const STALLED: f64 = 0.3;
+
+/// What a correction may be of the unknowns by rounding alone.
+const ROUNDING: f64 = f64::EPSILON;
 
 /// Rate of convergence beyond which there is none.
 const DIVERGENT: f64 = 0.99;
@@ -40,13 +43,14 @@ impl Radau {
     pub(super) fn iterate(&mut self, system: &mut dyn ImplicitSystem, h: f64) -> Result<usize, StepError> {
         self.newton = Convergence { rate: super::FAST, left: libm::pow(self.newton.left.max(f64::EPSILON), 0.8) };
         let (mut before, mut growth_before, mut wanted_before) = (0.0_f64, 0.0, f64::INFINITY);
+        let (rounding, steep) = (ROUNDING / self.relative.max(f64::EPSILON), self.is_steep(system, h));
         for iteration in 1..=MOST_ITERATIONS {
             self.correct(system, h)?;
             self.work.iterations += 1;
             let [a, b, c] = &self.correction;
             let size = norm(&[a, b, c], &self.allowed);
             let wanted = self.wanted.as_ref().map_or(size, |wanted| norm(&[a, b, c], wanted));
-            if iteration > 1 && iteration < MOST_ITERATIONS {
+            if iteration > 1 && iteration < MOST_ITERATIONS && !(steep && size <= rounding) {
                 let growth = size / before;
                 self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
                 growth_before = growth;
@@ -59,12 +63,27 @@ impl Radau {
             let stalled = wanted > STALLED * wanted_before || iteration == MOST_ITERATIONS;
             let enough = self.newton_tolerance / self.newton.left;
             self.apply();
-            if size <= enough && (wanted <= enough || stalled) {
+            // One correction by a steep Jacobian says little of what it leaves: where a diode has begun to conduct meanwhile, all of
+            // them are short.
+            let told = iteration > 1 || !steep || size <= rounding;
+            if told && size <= enough && (wanted <= enough || stalled) {
                 return Ok(iteration);
             }
             wanted_before = wanted;
         }
         Err(StepError::Slow { shorten: 0.5 })
+    }
+
+    /// Whether the rate of an unknown would change by far more in the step than by its own tolerance, if only what the Jacobian
+    /// says happened to it: then corrections are short whatever is left.
+    fn is_steep(&mut self, system: &dyn ImplicitSystem, h: f64) -> bool {
+        let sums = &mut self.rates_of_change;
+        sums.fill([0.0; 2]);
+        for (place, (row, column)) in system.sparsity().entries().enumerate() {
+            sums[row][0] += (self.dy[place] * h).abs() * self.allowed[column];
+            sums[row][1] += self.dyp[place].abs() * self.allowed[column];
+        }
+        sums.iter().any(|[by_values, by_rates]| *by_rates > 0.0 && *by_values > STEEP * by_rates)
     }
 
     /// Whether `remaining` more iterations will do after a correction of this size.

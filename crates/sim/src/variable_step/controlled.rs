@@ -3,7 +3,7 @@
 use std::ops::DerefMut;
 
 use super::Integrator;
-use super::first_step::first_step;
+use super::first_step::{first_step, seeing_inside};
 use super::stiffness::Stiffness;
 use super::tolerances::Tolerances;
 use crate::driver::{Flow, Run, Stepper, is_at};
@@ -129,6 +129,12 @@ impl<'i, 's> Controlled<'i, 's> {
         let mut rates = vec![0.0; x.len()];
         let longest = (stop - time).min(self.most.unwrap_or(f64::INFINITY));
         let resume = self.resume.take();
+        let known = resume.as_ref().map(|resume| resume.step).or(self.first);
+        if let Some(step) = known.and_then(|step| self.seeing_inside((time, x), step, longest)) {
+            (self.first, self.corner) = (None, false);
+            self.shared.system().rates(time, x, &mut rates)?;
+            return self.method.restart(time, x, &rates, step);
+        }
         if let Some(Resume { step, bends: true }) = resume {
             self.corner = true;
             return self.method.continue_at(time, x, step.min(longest));
@@ -149,7 +155,15 @@ impl<'i, 's> Controlled<'i, 's> {
             let system = &mut *self.shared.system();
             first_step(system, self.tolerances, order, time, x, longest, &mut rates)?
         };
+        let step = self.seeing_inside((time, x), step, longest).unwrap_or(step);
+        self.shared.system().rates(time, x, &mut rates)?;
         self.method.restart(time, x, &rates, step)
+    }
+
+    /// A shorter step, if this one may miss what time alone does before the next event, which is so far away.
+    fn seeing_inside(&mut self, here: (f64, &[f64]), step: f64, longest: f64) -> Option<f64> {
+        let looks = self.method.sees_ends_alone();
+        looks.then(|| seeing_inside(&mut *self.shared.system(), self.tolerances, here, step.min(longest), longest))?
     }
 
     /// Goes on from a point that was moved where the last step ended.

@@ -48,3 +48,38 @@ fn bend(system: &mut dyn System, tolerances: &Tolerances, t: f64, x: &[f64], tri
     change.iter_mut().zip(rates).for_each(|(change, rate)| *change -= rate);
     Some(tolerances.norm(&change, x) / trial).filter(|bend| bend.is_finite())
 }
+
+/// Parts of the time to the next event at which rates are looked at.
+const INSIDE: [f64; 3] = [0.23, 0.5, 0.81];
+/// A step longer than this part of it may miss what happens there.
+const LONG: f64 = 0.1;
+/// What such a step is shortened to.
+const SHORT: f64 = 0.02;
+
+/// A shorter step from `(t, x)` than `step`, where the next event is `longest` away, for a method that sees only the ends of its
+/// steps: where time alone makes more of the rates inside than both ends tell, as a pulse between two events does that begins and
+/// ends at 0.
+pub(super) fn seeing_inside(
+    system: &mut dyn System,
+    tolerances: &Tolerances,
+    (t, x): (f64, &[f64]),
+    step: f64,
+    longest: f64,
+) -> Option<f64> {
+    if step <= LONG * longest || x.is_empty() {
+        return None;
+    }
+    let mut at = |part: f64| {
+        let mut rates = vec![0.0; x.len()];
+        system.rates(t + part * longest, x, &mut rates).ok().map(|()| rates)
+    };
+    let (Some(begin), Some(end)) = (at(0.0), at(1.0)) else { return None };
+    let hides = INSIDE.into_iter().any(|part| {
+        let Some(mut inside) = at(part) else { return true };
+        let straight = begin.iter().zip(&end).map(|(begin, end)| begin + part * (end - begin));
+        inside.iter_mut().zip(straight).for_each(|(rate, straight)| *rate -= straight);
+        let most = tolerances.norm(&inside, x) * longest;
+        most.is_nan() || most > 1.0
+    });
+    hides.then_some(SHORT * longest)
+}

@@ -24,6 +24,11 @@ trait Integrator {
     /// Order of the first step after a restart.
     fn first_order(&self) -> usize;
 
+    /// Whether rates are taken at the ends of steps alone.
+    fn sees_ends_alone(&self) -> bool {
+        false
+    }
+
     /// Starts anew at `(t, x)`, where the rates are `dx`, with a first step of about `h`.
     fn restart(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure>;
 

@@ -81,7 +81,7 @@ static void ha_begin_search(ha_model *m, double t, $real *z)
 
 //end
 //item ha_solve_each
-/* Newton for each unknown of a pass by itself. */
+/* Newton for each unknown of a pass by itself, from where it stands, or beside it where its slope is 0 there. */
 static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, $real *z, unsigned char *known, unsigned char *met)
 {
     $real out[HA_MOST_AT_ONCE];
@@ -90,24 +90,33 @@ static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, $real *z, 
     $real best[HA_MOST_AT_ONCE] = {$0.0};
     $real step[HA_MOST_AT_ONCE] = {$0.0};
     $real begin[HA_MOST_AT_ONCE] = {$0.0};
+    static const $real guesses[] = {
+        $0.0, $1e-6, $1e-3, $1.0, -$1.0, -$1e-3, $30.0, -$30.0, $1e3, -$1e3};
+    const int most = 60 * (int)(sizeof guesses / sizeof guesses[0]);
     unsigned char done[HA_MOST_AT_ONCE];
     int iteration;
     int i;
     for (i = 0; i < pass->count; ++i) {
-        least[i] = $HUGE_VAL;
         begin[i] = z[pass->unknowns[i]];
-        best[i] = begin[i];
-        step[i] = $0.0;
         done[i] = 0;
     }
-    for (iteration = 0; iteration < 60; ++iteration) {
+    for (iteration = 0; iteration < most; ++iteration) {
         int all = 1;
+        for (i = 0; iteration % 60 == 0 && i < pass->count; ++i) {
+            if (!done[i]) {
+                least[i] = $HUGE_VAL;
+                best[i] = begin[i] + guesses[iteration / 60];
+                step[i] = $0.0;
+                z[pass->unknowns[i]] = best[i];
+            }
+        }
         $ha_fill(m->along, $0.0, HA_DIRECTION);
         for (i = 0; i < pass->count; ++i) {
             *$ha_along_unknown(m, pass->unknowns[i]) = $1.0;
         }
         if ($ha_start_residuals(m, t, pass->code, z, out, slope) != $MODEL_OK) {
-            break;
+            iteration += 59 - iteration % 60;
+            continue;
         }
         for (i = 0; i < pass->count; ++i) {
             $real *place = &z[pass->unknowns[i]];

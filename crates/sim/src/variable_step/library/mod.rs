@@ -194,6 +194,10 @@ where
         if self.explicit { 5 } else { 1 }
     }
 
+    fn sees_ends_alone(&self) -> bool {
+        !self.explicit
+    }
+
     fn restart(&mut self, t: f64, x: &[f64], dx: &[f64], h: f64) -> Result<(), Failure> {
         let vector = |values: &[f64]| M::V::from_slice(values, M::C::default());
         let none = || M::V::zeros(0, M::C::default());
