@@ -156,7 +156,6 @@ impl<'i, 's> Controlled<'i, 's> {
             first_step(system, self.tolerances, order, time, x, longest, &mut rates)?
         };
         let step = self.seeing_inside((time, x), step, longest).unwrap_or(step);
-        self.shared.system().rates(time, x, &mut rates)?;
         self.method.restart(time, x, &rates, step)
     }
 
