@@ -219,7 +219,8 @@ fn corners_do_not_start_anew() {
 
 #[test]
 fn fine_tables_cost_few_steps_a_row() {
-    for (method, steps, rates) in [(Explicit, 1000, 7003), (Auto, 1000, 7003), (Bdf, 6500, 13_500), (Radau, 6500, 8500)] {
+    for (method, steps, rates) in [(Explicit, 1000, 7003), (Auto, 1000, 7003), (Bdf, 6500, 13_500), (Radau, 6500, 8500)]
+    {
         let mut system = table_of_a_sine();
         let (samples, end) = system.run(&options(method, 1e-6, 1.0));
         let summary = end.unwrap();
