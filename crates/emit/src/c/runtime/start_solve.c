@@ -97,7 +97,10 @@ static void ha_solve_each(ha_model *m, double t, const ha_pass *pass, $real *z, 
     int iteration;
     int i;
     for (i = 0; i < pass->count; ++i) {
+        least[i] = $HUGE_VAL;
         begin[i] = z[pass->unknowns[i]];
+        best[i] = begin[i];
+        step[i] = $0.0;
         done[i] = 0;
     }
     for (iteration = 0; iteration < most; ++iteration) {
