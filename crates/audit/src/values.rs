@@ -305,6 +305,23 @@ impl<'a> Values<'a> {
         }
     }
 
+    /// A time so near to that of a sample, on its side of a jump, that there is no other between them.
+    fn beside(&self, sample: usize) -> f64 {
+        let t = self.times[sample];
+        let halfway = |other: &f64| 0.5 * (t + other);
+        match self.side(sample) {
+            // A run that ends at a jump stands before it.
+            Side::Before | Side::Inside => {
+                let before = self.times[..sample].iter().rev().find(|&&other| other < t);
+                (t - reach(t)).max(before.map_or(f64::NEG_INFINITY, halfway))
+            }
+            Side::After => {
+                let behind = self.times[sample..].iter().find(|&&other| other > t);
+                (t + reach(t)).min(behind.map_or(f64::INFINITY, halfway))
+            }
+        }
+    }
+
     /// Whether a sample stands before a jump at its time.
     pub fn is_before_jump(&self, sample: usize) -> bool {
         self.side(sample) == Side::Before
@@ -513,13 +530,7 @@ impl Reader<'_, '_> {
             return None;
         }
         let values = self.values;
-        let t = values.times[sample];
-        let t = match values.side(sample) {
-            // A run that ends at a jump stands before it.
-            Side::Before | Side::Inside if self.timed => t - reach(t),
-            Side::After if self.timed => t + reach(t),
-            _ => t,
-        };
+        let t = if self.timed { values.beside(sample) } else { values.times[sample] };
         let read = self.read.get_or_init(|| Reads::new(values, &self.wanted, &self.rates));
         let column = |symbol: Symbol, column: &[f64]| {
             [moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)]

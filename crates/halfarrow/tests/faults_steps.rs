@@ -462,3 +462,106 @@ fn a_diode_that_begins_to_conduct_is_not_stepped_over() {
         }
     }
 }
+
+/// The same law in words that an engineer may take for it.
+const ORIFICES: [&str; 3] = [
+    "f = k*sign(e)*sqrt(abs(e))",
+    "f = sign(e)*k*sqrt(2)*sqrt(abs(e/2))",
+    "f = if e > 0 then k*sqrt(e) else -k*sqrt(-e)",
+];
+
+/// Its slope is infinite where the levels meet, and there they stay: `sqrt(e) = sqrt(e0) - k t/c` until then.
+#[test]
+fn tanks_level_out_through_an_orifice() {
+    let (k, c, before) = (3e-5, 1e-4, 15e3_f64);
+    for law in ORIFICES {
+        let model = text(&format!(
+            "model Tanks\nparam k = {k}\n0:n1 -> C:t1(c = {c}, e0 = 20e3)\n0:n2 -> C:t2(c = {c}, e0 = 5e3)\nn1 -> 1:p -> n2\np -> R:o({law})\n"
+        ));
+        for (method, most) in [(Method::Auto, 200), (Method::Bdf, 250)] {
+            let asked = Run {
+                to: 1000.0,
+                every: Some(100.0),
+                method,
+                record: Record::Names(vec!["o.e".into()]),
+                ..Run::default()
+            };
+            let done = run(&model, asked);
+            assert!(done.report.steps <= most, "{law}, {method:?}: {} steps", done.report.steps);
+            let drop = &done.trace.columns.iter().find(|column| column.name == "o.e").expect("it is recorded").values;
+            for (hundreds, drop) in drop.iter().enumerate() {
+                let root = (before.sqrt() - k * 100.0 * hundreds as f64 / c).max(0.0);
+                assert!((drop - root * root).abs() <= 1e-6 * 20e3, "{law}, {method:?}: {drop} at {hundreds}00 s");
+            }
+        }
+    }
+}
+
+/// The inverse of a cube: no time constant is left where it goes through 0, driven back and forth, and at rest.
+#[test]
+fn a_law_of_infinite_slope_is_passed() {
+    let rest = text("model Rest\n0:n -> C:c(1, q0 = 1)\nn -> R:r(e = 2*f^3)\n");
+    for (model, methods) in
+        [(fault("cube_root"), &[Method::Auto, Method::Bdf, Method::Radau][..]), (rest, &[Method::Auto, Method::Bdf])]
+    {
+        for &method in methods {
+            let report = run(&model, Run { to: 4.0, method, ..Run::default() }).report;
+            assert!(report.steps <= 1000, "{method:?}: {} steps", report.steps);
+            assert_ne!(report.audit.verdict, Verdict::Refused, "{method:?}");
+        }
+    }
+}
+
+/// Levels that are equal from the start move all the same, and a row of tanks comes to rest one after the other.
+#[test]
+fn tanks_that_are_level_are_filled() {
+    for law in ORIFICES {
+        let row: String = (1..20)
+            .map(|i| {
+                format!("0:n{i} -> C:t{i}(c = 1e-4, e0 = 5e3)\nn{i} -> 1:p{i} -> n{}\np{i} -> R:o{i}({law})\n", i + 1)
+            })
+            .collect();
+        let model = text(&format!(
+            "model Row\nparam k = 3e-5\n{row}0:n20 -> C:t20(c = 1e-4, e0 = 5e3)\nSf:pump(if t > 100 and t < 300 then 0.5e-3 else 0) -> n1\n"
+        ));
+        for (method, step, most) in [
+            (Method::Auto, None, 1000),
+            (Method::Bdf, None, 1500),
+            (Method::Fixed(FixedMethod::LinearlyImplicitBdf2), Some(0.25), 20_000),
+        ] {
+            let record = Record::Names(["t1.e", "t12.e", "t20.e"].map(String::from).to_vec());
+            let done = run(&model, Run { to: 4000.0, every: Some(50.0), method, step, record, ..Run::default() });
+            assert!(done.report.steps <= most, "{law}, {method:?}: {} steps", done.report.steps);
+            for column in &done.trace.columns {
+                let (first, last) = (column.values[1], column.values.last().expect("samples"));
+                assert!((first - 5e3).abs() <= 1e-3, "{law}, {method:?}: {} at 50 s", first);
+                assert!((last - (5e3 + 0.1 / 20.0 / 1e-4)).abs() <= 0.05, "{law}, {method:?}: {} at the end", last);
+            }
+        }
+    }
+}
+
+/// A storage beside a jump of a source meets a corner of a law a few roundings later: each sample is on its own side of both.
+#[test]
+fn two_jumps_may_follow_each_other_by_a_few_roundings() {
+    let model = text(
+        "model Jumps\nparam k = 3e-5\n0:n1 -> C:t1(c = 1e-4, e0 = 5e3)\n0:n2 -> C:t2(c = 1e-4, e0 = 5e3)\nn1 -> 1:p -> n2\n\
+         p -> R:o(f = if abs(e) > 1e-12 then k*e else 2*k*e)\nSf:pump(if t > 100 and t < 200 then 0.5e-3 else 0) -> n1\n",
+    );
+    let done = run(&model, Run { to: 300.0, method: Method::Bdf, ..Run::default() });
+    assert!(done.trace.times.iter().any(|&t| t > 100.0 && t < 100.0 + 1e-12), "the corner is elsewhere");
+    assert_eq!(done.report.audit.verdict, Verdict::Holds);
+}
+
+/// Where all laws of a net without storages pass their corners together, the iteration goes over them.
+#[test]
+fn a_net_without_storages_passes_its_corner() {
+    let model = text(
+        "model Net\nSe:v(3*sin(48*t)) -> 1:c -> R:r1(2)\nc -> 0:n -> R:r2(e = 3*f^3 + f)\nn -> R:r3(e = 2*max(f, 0) + 0.1*f)\n\
+         n -> R:r4(f = e^3 + e)\n",
+    );
+    for (method, step) in [(Method::Auto, None), (Method::Fixed(FixedMethod::Rk4), Some(1e-3))] {
+        let done = run(&model, Run { to: 1.0, method, step, ..Run::default() });
+        assert_eq!(done.report.audit.verdict, Verdict::Holds, "{method:?}");
+    }
+}

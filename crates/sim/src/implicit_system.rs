@@ -53,6 +53,11 @@ pub trait ImplicitSystem {
     /// Index of an unknown: 1, 2 or 3.
     fn index(&self, unknown: usize) -> u8;
 
+    /// Whether laws are infinitely steep where unknowns may come to rest, as [`System::is_steep`](crate::System::is_steep).
+    fn is_steep(&self) -> bool {
+        false
+    }
+
     /// Residuals `out = F(t, y, y')`. `yp` of an algebraic unknown is not read.
     ///
     /// # Errors

@@ -133,6 +133,9 @@ impl System for Counted<'_> {
     fn compares_rates(&self) -> bool {
         self.system.compares_rates()
     }
+    fn is_steep(&self) -> bool {
+        self.system.is_steep()
+    }
     fn sparsity(&self) -> &Sparsity {
         self.system.sparsity()
     }

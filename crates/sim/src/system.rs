@@ -46,6 +46,12 @@ pub trait System {
         false
     }
 
+    /// Whether laws are infinitely steep where states may come to rest, as that of an orifice between equal levels: then slopes
+    /// are taken beside such points, as far as an error is allowed.
+    fn is_steep(&self) -> bool {
+        false
+    }
+
     /// Where `∂f/∂x` may be nonzero, in whatever mode.
     fn sparsity(&self) -> &Sparsity;
 

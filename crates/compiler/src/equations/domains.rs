@@ -1,10 +1,10 @@
 //! Where laws have a value: what a logarithm, a root or a table may be asked for.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::blocks::elements_of;
 use super::definitions::{Definition, Definitions};
-use super::{DomainKind, EquationStep, LawDomain, State};
+use super::{DomainKind, EquationStep, LawDomain, NewtonBlock, State};
 use crate::algebra::{Expr, Exprs, Function, Node, Outside, Symbol};
 use crate::bond_graph::Meaning;
 
@@ -13,13 +13,11 @@ use crate::bond_graph::Meaning;
 /// of the equations that are iterated: a current that is `-is` to rounding asks nothing of a law that is never inverted.
 pub fn domains(d: &mut Definitions, states: &[State], steps: &[EquationStep]) -> Vec<LawDomain> {
     let mut all = Vec::new();
-    let mut iterated: BTreeMap<Symbol, BTreeSet<Expr>> = BTreeMap::new();
-    for step in steps {
-        let EquationStep::Newton(block) = step else { continue };
-        let inside = block.body.iter().map(|(_, value)| *value).chain(block.residuals.iter().copied());
-        let asked: BTreeSet<Expr> = inside.flat_map(|e| partial_parts(&d.x, e)).map(|(argument, _)| argument).collect();
-        iterated.extend(block.unknowns.iter().map(|&unknown| (unknown, asked.clone())));
-    }
+    let iterated: BTreeSet<Symbol> = iterations(steps).flat_map(|block| block.unknowns.iter().copied()).collect();
+    let inside =
+        iterations(steps).flat_map(|block| block.body.iter().map(|b| b.1).chain(block.residuals.iter().copied()));
+    let partial = inside.filter(|&e| !d.x.total(e)).flat_map(|e| partial_parts(&d.x, e));
+    let in_iterations: BTreeSet<Expr> = partial.map(|(argument, _)| argument).collect();
     let states: BTreeSet<Symbol> = states.iter().map(|s| s.symbol).collect();
     let explicit: Vec<(Symbol, Expr)> =
         d.of.iter().filter_map(|(&s, d)| if let Definition::Explicit(e) = d { Some((s, *e)) } else { None }).collect();
@@ -30,9 +28,9 @@ pub fn domains(d: &mut Definitions, states: &[State], steps: &[EquationStep]) ->
         let of_an_element =
             matches!(d.meaning(symbol), Some(Meaning::Effort(_) | Meaning::Flow(_) | Meaning::Stored(_)));
         let elements = if of_an_element { elements_of(d, &[symbol]) } else { Vec::new() };
-        let iterated = iterated.get(&symbol);
+        let is_iterated = iterated.contains(&symbol);
         for (argument, kind) in partial_parts(&d.x, value) {
-            if iterated.is_some_and(|asked| !asked.contains(&argument)) {
+            if is_iterated && !in_iterations.contains(&argument) {
                 continue;
             }
             let asked = asked(d, argument);
@@ -41,6 +39,11 @@ pub fn domains(d: &mut Definitions, states: &[State], steps: &[EquationStep]) ->
         }
     }
     all
+}
+
+/// The iterations among the steps.
+fn iterations(steps: &[EquationStep]) -> impl Iterator<Item = &NewtonBlock> {
+    steps.iter().filter_map(|step| if let EquationStep::Newton(block) = step { Some(&**block) } else { None })
 }
 
 /// What an expression calls that has no value everywhere, with what must hold of its argument.

@@ -21,6 +21,10 @@ pub(super) struct Lowering<'a> {
     known: Vec<Option<Value>>,
     /// Sums whose sine and cosine are made of those of their terms.
     sums: FxHashSet<Expr>,
+    /// Functions and comparisons whose sides are passed without an event.
+    free: FxHashSet<Expr>,
+    /// Whether what is being lowered is one of them.
+    passing: bool,
     sharing: Rc<Sharing>,
     /// Symbols and expressions of the Newton block that is being lowered.
     inner: Option<Inner>,
@@ -34,7 +38,8 @@ struct Inner {
 }
 
 impl<'a> Lowering<'a> {
-    pub fn new(exprs: &'a Exprs, sums: FxHashSet<Expr>, sharing: Sharing) -> Self {
+    /// `sums`: those of angles that are taken apart; `free`: what [`free_sides`](super::roots::free_sides) gives.
+    pub fn new(exprs: &'a Exprs, (sums, free): (FxHashSet<Expr>, FxHashSet<Expr>), sharing: Sharing) -> Self {
         Lowering {
             exprs,
             values: Values::default(),
@@ -43,6 +48,8 @@ impl<'a> Lowering<'a> {
             symbols: vec![None; exprs.symbol_count()],
             known: vec![None; exprs.len()],
             sums,
+            free,
+            passing: false,
             sharing: Rc::new(sharing),
             inner: None,
         }
@@ -99,6 +106,7 @@ impl<'a> Lowering<'a> {
 
     /// Lowers an expression whose parts are lowered.
     fn node_of(&mut self, e: Expr) -> Value {
+        self.passing = self.passes_freely(e);
         let value = self.node(e);
         match &mut self.inner {
             Some(inner) => {
@@ -360,6 +368,22 @@ impl<'a> Lowering<'a> {
         if may_be_below { self.op(Op::Call(Function::Abs, a)) } else { a }
     }
 
+    /// Whether a side is passed without an event, since states take it there. Where time alone does, the event is known
+    /// beforehand.
+    fn passes_freely(&self, e: Expr) -> bool {
+        let moves = |part| self.known(part).is_some_and(|part| self.values.reads(part).includes(Reads::STATE));
+        let mut moved = false;
+        if self.free.contains(&e) {
+            self.exprs.node(e).for_each_child(|part| moved |= moves(part));
+        }
+        moved
+    }
+
+    /// Whether any of them is.
+    pub fn is_steep(&self) -> bool {
+        self.free.iter().any(|&e| self.passes_freely(e))
+    }
+
     fn call(&mut self, f: Function, a: Value, b: Option<Value>) -> Value {
         match (f, b) {
             (Function::Mod, Some(b)) => {
@@ -423,7 +447,7 @@ impl<'a> Lowering<'a> {
     /// Whether conditions on the value are held: it varies and is no guess.
     fn holds(&self, a: Value) -> bool {
         let reads = self.values.reads(a);
-        reads != Reads::PARAMETERS && !reads.includes(Reads::GUESS)
+        !self.passing && reads != Reads::PARAMETERS && !reads.includes(Reads::GUESS)
     }
 
     fn side(&mut self, a: Value) -> Value {

@@ -34,6 +34,7 @@ mod parts;
 mod print;
 mod ratios;
 mod repetition;
+mod roots;
 mod routine;
 mod samples;
 mod schedule;
@@ -156,6 +157,8 @@ pub struct Program {
     pub domains: Vec<LawDomain>,
     /// What must hold of parameters: where it does not, the equations are others than these.
     pub assumptions: Vec<Assumption>,
+    /// Whether states may come to rest where a law is infinitely steep.
+    pub steep: bool,
     /// For each state the states that its rate or residual reads, ascending; their free rates count as they.
     pub dependence: Vec<Vec<u32>>,
 }

@@ -7,6 +7,7 @@ use super::dependence::Dependence;
 use super::kept::kept;
 use super::lower::Lowering;
 use super::op::Op;
+use super::roots::free_sides;
 use super::sharing::share;
 use super::start::{is_linear, place_guesses};
 use super::values::Reads;
@@ -29,13 +30,15 @@ use std::sync::Arc;
 /// If a step reads a symbol that is not given or defined before it: then the equations are not in evaluation order.
 pub fn schedule(equations: &Equations) -> Program {
     let graph = &equations.graph;
-    let (exprs, needed) = evaluated(equations);
+    let Evaluated { exprs, wholes, needed } = evaluated(equations);
     let fixed: FxHashSet<Symbol> = graph.parameters.values().map(|p| p.symbol).collect();
     let varies = |e| graph.exprs.depends_on_any(e, &|s| !fixed.contains(&s));
     let sharing = share(&graph.exprs, &exprs, &varies);
+    let sums = sums_of_angles(&graph.exprs, &exprs);
+    let free = free_sides(&graph.exprs, &exprs, &wholes, &varies);
     let mut schedule = Schedule {
         graph,
-        lower: Lowering::new(&graph.exprs, sums_of_angles(&graph.exprs, &exprs), sharing),
+        lower: Lowering::new(&graph.exprs, (sums, free), sharing),
         blocks: Table::new(),
         factored: FxHashMap::default(),
         pivot_guards: Vec::new(),
@@ -52,8 +55,17 @@ pub fn schedule(equations: &Equations) -> Program {
     schedule.finish(equations, parameters)
 }
 
-/// Every expression that the rates are evaluated from, and all below it; for each step whether it gives one of these.
-fn evaluated(equations: &Equations) -> (Vec<Expr>, Vec<bool>) {
+/// What the rates are evaluated from.
+struct Evaluated {
+    /// Every expression, and all below it.
+    exprs: Vec<Expr>,
+    /// Those that stand for themselves.
+    wholes: Vec<Expr>,
+    /// For each step whether it gives one of these.
+    needed: Vec<bool>,
+}
+
+fn evaluated(equations: &Equations) -> Evaluated {
     let exprs = &equations.graph.exprs;
     let mut step_of: Vec<Option<u32>> = vec![None; exprs.symbol_count()];
     let mut gives = |symbol: Symbol, step: usize| step_of[symbol.0 as usize] = Some(step as u32);
@@ -87,7 +99,7 @@ fn evaluated(equations: &Equations) -> (Vec<Expr>, Vec<bool>) {
             }
         }
         if read == roots.len() {
-            return (exprs.below(&roots, &|_| true), seen);
+            return Evaluated { exprs: exprs.below(&roots, &|_| true), wholes: roots, needed: seen };
         }
         roots[read..].iter().for_each(|&e| open.extend(exprs.symbols_of(e).iter()));
         read = roots.len();
@@ -316,6 +328,7 @@ impl Schedule<'_> {
         let position_relations = position_relations(lower, equations);
         let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
 
+        let steep = self.lower.is_steep();
         self.lower.values.settle();
         let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
         let flow = Dataflow { values: &values, blocks: &blocks, parameters: &parameters };
@@ -363,6 +376,7 @@ impl Schedule<'_> {
             parameters,
             blocks,
             pivot_guards,
+            steep,
             values,
         };
         debug_assert_eq!(verify(&program), Ok(()), "{}", program.name);

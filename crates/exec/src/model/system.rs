@@ -141,15 +141,18 @@ impl Model {
         jv.iter().position(|slope| !slope.is_finite())
     }
 
-    /// Puts states in their registers that are a little further on the way that the rates, evaluated last, lead.
+    /// Puts states in their registers that are a little further on the way that the rates, evaluated last, lead, equal ones not
+    /// equally far.
     pub(super) fn place_beside(&mut self, t: f64, x: &[f64]) {
         let mut beside = std::mem::take(&mut self.beside);
-        for ((beside, x), &register) in beside.iter_mut().zip(x).zip(&self.code.rates.outputs) {
+        let states = x.len() as f64;
+        for (i, ((beside, x), &register)) in beside.iter_mut().zip(x).zip(&self.code.rates.outputs).enumerate() {
             let rate = self.frame.r[register as usize];
             let rate = if rate.is_finite() { rate } else { 0.0 };
             let size = if rate < 0.0 { -x.abs() } else { x.abs() };
             let way = BESIDE * (size + rate);
-            *beside = x + if way == 0.0 { BESIDE * BESIDE } else { way };
+            let farther = 1.0 + i as f64 / states;
+            *beside = x + farther * if way == 0.0 { BESIDE * BESIDE } else { way };
         }
         self.place(t, &beside);
         self.beside = beside;
@@ -206,6 +209,10 @@ impl System for Model {
 
     fn compares_rates(&self) -> bool {
         self.code.program.is_long()
+    }
+
+    fn is_steep(&self) -> bool {
+        self.code.program.steep
     }
 
     fn sparsity(&self) -> &Sparsity {

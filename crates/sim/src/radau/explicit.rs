@@ -20,12 +20,13 @@ pub(crate) struct Explicit<'s> {
 }
 
 impl<'s> Explicit<'s> {
-    pub(crate) fn new(shared: &'s Shared<'s>) -> Explicit<'s> {
+    /// For a method that allows these errors, relative and absolute of each state.
+    pub(crate) fn new(shared: &'s Shared<'s>, (relative, absolute): (f64, &[f64])) -> Explicit<'s> {
         let system = shared.system();
         let own = system.sparsity();
         let sparsity = own.with_diagonal();
         Explicit {
-            jacobian: Jacobian::new(own),
+            jacobian: Jacobian::new(own).within(relative, absolute.to_vec()),
             places: own.entries().map(|(row, column)| sparsity.place(row, column)).collect(),
             diagonal: (0..system.states()).map(|i| sparsity.place(i, i)).collect(),
             scales: system.scales().to_vec(),
@@ -56,6 +57,9 @@ impl ImplicitSystem for Explicit<'_> {
         self.shared.system().rates(t, y, out)?;
         out.iter_mut().zip(yp).for_each(|(out, yp)| *out = yp - *out);
         Ok(())
+    }
+    fn is_steep(&self) -> bool {
+        self.shared.system().is_steep()
     }
     fn sparsity(&self) -> &Sparsity {
         &self.sparsity

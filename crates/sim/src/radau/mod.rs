@@ -328,6 +328,10 @@ impl Radau {
                 }
                 Err(StepError::Slow { shorten }) => {
                     self.start_otherwise();
+                    if system.is_steep() {
+                        // Where states come to rest the last step leads far beyond.
+                        self.last.forget();
+                    }
                     self.h = shorten * h;
                     (failure, slow) = (None, true);
                 }

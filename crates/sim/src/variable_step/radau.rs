@@ -16,8 +16,9 @@ pub(super) struct OnStates<'s> {
 
 impl<'s> OnStates<'s> {
     pub(super) fn new(shared: &'s Shared<'s>, tolerances: &Tolerances) -> OnStates<'s> {
-        let system = Explicit::new(shared);
-        let radau = Radau::new(&system, tolerances.relative(), &tolerances.absolute(1.0));
+        let (relative, absolute) = (tolerances.relative(), tolerances.absolute(1.0));
+        let system = Explicit::new(shared, (relative, &absolute));
+        let radau = Radau::new(&system, relative, &absolute);
         OnStates { shared, rates: vec![0.0; system.unknowns()], system, radau }
     }
 }

@@ -20,6 +20,13 @@ const STABILITY_LIMIT: f64 = 2.0;
 /// Looks in a row that must find stiffness.
 const CHECKS: usize = 4;
 
+/// Steps in a row in which a state turns round, give or take some, that nothing but a law that is infinitely steep there makes it do:
+/// it goes to and fro by the error that is allowed. How steep that law is says nothing, since the steps are as long as it lets them be.
+const TURNS: u8 = 16;
+
+/// Part of the relative tolerance of its magnitude that a state moves by at least in such a step.
+const TURNED: f64 = 1e-4;
+
 /// Steps still to come below which a change of method does not pay.
 const WORTH_A_CHANGE: f64 = 200.0;
 
@@ -29,6 +36,10 @@ pub(super) struct Stiffness {
     checks: usize,
     vector: Vec<f64>,
     product: Vec<f64>,
+    /// Of each state the last value, by how much it has moved, and how often it has turned round.
+    last: Vec<f64>,
+    moved: Vec<f64>,
+    turns: Vec<u8>,
 }
 
 impl Stiffness {
@@ -37,7 +48,9 @@ impl Stiffness {
         let start =
             |(i, magnitude): (usize, &f64)| magnitude * (1.0 + (i % 7) as f64) * if i % 2 == 0 { 1.0 } else { -1.0 };
         let vector: Vec<f64> = tolerances.magnitudes().iter().enumerate().map(start).collect();
-        Stiffness { steps: 0, checks: 0, product: vec![0.0; vector.len()], vector }
+        let none = vec![0.0; vector.len()];
+        let turns = vec![0; vector.len()];
+        Stiffness { steps: 0, checks: 0, product: none.clone(), vector, last: none.clone(), moved: none, turns }
     }
 
     /// Takes notice of an accepted step of length `h` to `(t, x)`, `remaining` s before the next stop. `true` if the
@@ -51,13 +64,34 @@ impl Stiffness {
         remaining: f64,
     ) -> bool {
         self.steps += 1;
+        let pays = remaining > WORTH_A_CHANGE * h;
+        if system.is_steep() && self.goes_to_and_fro(tolerances, x) && pays {
+            return true;
+        }
         let every = if self.vector.len() < LARGE { EVERY } else { EVERY_OF_LARGE };
         if !self.steps.is_multiple_of(every) {
             return false;
         }
         let radius = self.radius(system, tolerances, t, x).unwrap_or(0.0);
         self.checks = if h * radius > STABILITY_LIMIT { self.checks + 1 } else { 0 };
-        self.checks >= CHECKS && remaining > WORTH_A_CHANGE * h
+        self.checks >= CHECKS && pays
+    }
+
+    /// Whether a state has turned round in most of the last steps, the last of which has led to `x`.
+    fn goes_to_and_fro(&mut self, tolerances: &Tolerances, x: &[f64]) -> bool {
+        let Stiffness { last, moved, turns, .. } = self;
+        let least = TURNED * tolerances.relative();
+        let mut most = 0;
+        for (((x, last), (moved, turns)), magnitude) in
+            x.iter().zip(last).zip(moved.iter_mut().zip(turns)).zip(tolerances.magnitudes())
+        {
+            let moves = x - std::mem::replace(last, *x);
+            let turned = moves * *moved < 0.0 && moves.abs() > least * magnitude;
+            *turns = if turned { turns.saturating_add(1) } else { turns.saturating_sub(2) };
+            *moved = moves;
+            most = most.max(*turns);
+        }
+        most >= TURNS
     }
 
     /// Growth of the vector under the Jacobian; `None` where that cannot be had.

@@ -563,7 +563,7 @@ impl Parser<'_> {
 
     fn constraint(&mut self) -> Option<Constraint> {
         let PathPart { name, indices } = self.indexed("the name of the constraint")?;
-        self.expect(TokenKind::Colon, "`:`");
+        self.expect(TokenKind::Colon, "the name of the constraint with `:`, as in `constraint loop: x = y`,");
         let left = self.expr();
         let equality = self.is(TokenKind::Assign);
         let (left, sides, right, args) = match left.kind {

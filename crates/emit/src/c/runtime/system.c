@@ -293,7 +293,8 @@ static int ha_slopes_at(ha_model *m, double t, const $real *x, ha_along_code *co
 }
 
 //item ha_derivative_along
-/* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead. */
+/* The same; where the slope of a law is infinite it is that a little beside, on the way that the rates lead, for equal states
+ * not equally far. */
 static int ha_derivative_along(ha_model *m, double t, const $real *x, ha_along_code *code, $real *dv)
 {
     const $real *dx = m->along_out;
@@ -304,7 +305,8 @@ static int ha_derivative_along(ha_model *m, double t, const $real *x, ha_along_c
             const $real rate = $ha_finite(dx[i]) ? dx[i] : $0.0;
             const $real size = rate < $0.0 ? -$fabs(x[i]) : $fabs(x[i]);
             const $real way = $BESIDE * (size + rate);
-            m->beside[i] = x[i] + (way == $0.0 ? $BESIDE * $BESIDE : way);
+            const $real farther = $1.0 + ($real)i / ($real)HA_NX;
+            m->beside[i] = x[i] + farther * (way == $0.0 ? $BESIDE * $BESIDE : way);
         }
         status = $ha_slopes_at(m, t, m->beside, code, dv);
     }

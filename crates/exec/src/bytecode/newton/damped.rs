@@ -128,8 +128,7 @@ impl Frame {
     }
 
     /// Takes the correction with the greatest damping factor `1, 1/2, 1/4 ...` that passes the restricted natural
-    /// monotonicity test: the simplified correction behind it is at most `1 - damping / 4` times as long. Also whether
-    /// the undamped step contracts. `norm`: of the correction.
+    /// monotonicity test: the simplified correction behind it is [`shortened`]. Also whether the undamped step contracts. `norm`: of the correction.
     fn damped_step(&mut self, solve: &Solve, norm: f64, globalization: Globalization) -> (StepOutcome, bool) {
         let least_damping = self.least_damping(solve, globalization);
         let mut damping = 1.0;
@@ -137,7 +136,7 @@ impl Frame {
             self.newton_of(solve).set_trial(damping);
             if self.evaluate(solve, true) {
                 let simplified = self.simplified_correction_norm(solve, false);
-                if simplified <= (1.0 - 0.25 * damping) * norm || norm <= 2.0 * f64::EPSILON {
+                if simplified <= shortened(damping) * norm || norm <= 2.0 * f64::EPSILON {
                     return self.accept_step(solve, damping, norm, simplified);
                 }
             }
@@ -148,7 +147,7 @@ impl Frame {
             }
             damping *= 0.5;
             if damping < least_damping || self.newton_of(solve).exhausted() {
-                return self.reject_step(solve, globalization);
+                return self.reject_step(solve, norm, globalization);
             }
         }
     }
@@ -166,12 +165,17 @@ impl Frame {
     }
 
     /// No damping factor passes: there is a nonsmooth point, or the residuals are rounding, or the iteration fails.
-    fn reject_step(&mut self, solve: &Solve, globalization: Globalization) -> (StepOutcome, bool) {
-        if globalization == Globalization::Damped && self.crosses_nonsmooth_point(solve) {
+    fn reject_step(&mut self, solve: &Solve, norm: f64, globalization: Globalization) -> (StepOutcome, bool) {
+        if globalization == Globalization::Damped && self.crosses_nonsmooth_point(solve, norm) {
             self.newton_of(solve).accept_trial();
             return (StepOutcome::Accepted, false);
         }
         let rounding = self.stagnates_at_rounding(solve) && self.is_near_rounding(solve) || self.is_at_rounding(solve);
         if rounding { (StepOutcome::Converged, true) } else { (StepOutcome::Rejected, false) }
     }
+}
+
+/// How much of a correction may be left behind this part of it: the restricted natural monotonicity test.
+pub(super) fn shortened(damping: f64) -> f64 {
+    1.0 - 0.25 * damping
 }

@@ -1,5 +1,6 @@
 //! Laws whose derivative jumps: a step to just beyond the nonsmooth point.
 
+use super::damped::shortened;
 use crate::bytecode::frame::Frame;
 use crate::bytecode::instruction::Solve;
 
@@ -11,18 +12,14 @@ const JACOBIAN_ALIKE: f64 = 1e-3;
 const BISECTIONS: usize = 60;
 
 impl Frame {
-    /// Goes along the correction to just beyond where the Jacobian jumps, if no residual grows on that way: where the
-    /// derivative of a law jumps, Newton's model ends. Ends with an evaluation of the trial point, or at `x`.
-    pub(super) fn crosses_nonsmooth_point(&mut self, solve: &Solve) -> bool {
+    /// Goes along the correction, which is `norm` long, to just beyond where the Jacobian jumps: where the derivative of a law
+    /// jumps, Newton's model ends. So near behind it the correction has become shorter by what was gone of it, whatever the
+    /// laws do further on. Ends with an evaluation of the trial point, or at `x`.
+    pub(super) fn crosses_nonsmooth_point(&mut self, solve: &Solve, norm: f64) -> bool {
         if !self.evaluate(solve, false) {
             return false;
         }
         self.store_jacobian(solve);
-        let Frame { r, solvers, .. } = &mut *self;
-        let newton = &mut solvers[solve.block.0 as usize].newton;
-        for (i, &right) in solve.right.iter().enumerate() {
-            newton.simplified[i] = (r[right as usize] - newton.offset[i]).abs();
-        }
         let (mut before, mut beyond) = (0.0, 1.0);
         for _ in 0..BISECTIONS {
             self.newton_of(solve).set_trial(beyond);
@@ -30,7 +27,8 @@ impl Frame {
             let change = if finite { self.jacobian_change(solve) } else { f64::INFINITY };
             match change {
                 change if change > JACOBIAN_DIFFERS => {
-                    if beyond - before <= JACOBIAN_ALIKE * beyond && finite && self.residuals_decrease(solve) {
+                    let just_beyond = finite && beyond - before <= JACOBIAN_ALIKE * beyond;
+                    if just_beyond && self.simplified_correction_norm(solve, false) <= shortened(beyond) * norm {
                         return true;
                     }
                     beyond = 0.5 * (before + beyond);
@@ -59,13 +57,5 @@ impl Frame {
             before.iter().zip(now).for_each(|(j, &m)| change = change.max((self.r[m as usize] - j).abs() / most));
         }
         change
-    }
-
-    /// Whether no residual evaluated last is greater than those stored in `simplified`, and one is less.
-    fn residuals_decrease(&self, solve: &Solve) -> bool {
-        let newton = &self.solvers[solve.block.0 as usize].newton;
-        let now = |i: usize| (self.r[solve.right[i] as usize] - newton.offset[i]).abs();
-        (0..solve.right.len()).all(|i| now(i) <= newton.simplified[i])
-            && (0..solve.right.len()).any(|i| now(i) < newton.simplified[i])
     }
 }

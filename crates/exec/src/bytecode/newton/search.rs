@@ -212,11 +212,14 @@ impl Frame {
         n == 1 && self.scan(solve)
     }
 
-    /// A root by an iteration from the start that is set.
+    /// A root by an iteration from the start that is set. What floated on a way that led nowhere floats no more.
     fn search_from(&mut self, solve: &Solve) -> bool {
-        self.iterate(solve, Globalization::Damped).is_ok()
-            || self.solve_rank_deficient(solve)
-            || self.iterate_by_least_norm(solve)
+        self.newton_of(solve).floating.now.fill(false);
+        if self.iterate(solve, Globalization::Damped).is_ok() || self.solve_rank_deficient(solve) {
+            return true;
+        }
+        self.newton_of(solve).floating.now.fill(false);
+        self.iterate_by_least_norm(solve)
     }
 
     /// Where the laws have no value at any of the starts so far, as an exponential that overflows: one unknown elsewhere, in

@@ -242,6 +242,10 @@ impl System for Taped<'_> {
         self.model.time_derivative(t, x, out)
     }
 
+    fn is_steep(&self) -> bool {
+        self.model.is_steep()
+    }
+
     fn sparsity(&self) -> &Sparsity {
         self.model.sparsity()
     }

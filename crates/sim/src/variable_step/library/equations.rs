@@ -32,13 +32,14 @@ struct Newton<M: Matrix> {
 }
 
 impl<M: Matrix<T = f64>> Newton<M> {
-    fn new(system: &dyn System, context: &M::C) -> Newton<M> {
+    /// For errors that are allowed, relative and absolute of each state.
+    fn new(system: &dyn System, (relative, absolute): (f64, Vec<f64>), context: &M::C) -> Newton<M> {
         let (sparsity, states) = (system.sparsity(), system.states());
         let count = sparsity.nonzeros();
         let dense = || sparsity.entries().map(|(row, column)| row + column * states).collect();
         let to = if M::is_sparse() { (0..count).collect() } else { dense() };
         Newton {
-            jacobian: RefCell::new(Jacobian::new(sparsity)),
+            jacobian: RefCell::new(Jacobian::new(sparsity).within(relative, absolute)),
             pattern: sparsity.entries().collect(),
             values: RefCell::new(M::V::zeros(count, context.clone())),
             from: VectorIndex::from_vec((0..count).collect(), context.clone()),
@@ -48,14 +49,14 @@ impl<M: Matrix<T = f64>> Newton<M> {
 }
 
 impl<'s, M: Matrix<T = f64>> Equations<'s, M> {
-    /// Implicit methods ask for the Jacobian, explicit ones do not.
-    pub(super) fn new(shared: &'s Shared<'s>, implicit: bool) -> Equations<'s, M> {
+    /// Implicit methods, which ask for the Jacobian, tell which errors they allow, relative and absolute of each state.
+    pub(super) fn new(shared: &'s Shared<'s>, implicit: Option<(f64, Vec<f64>)>) -> Equations<'s, M> {
         let context = M::C::default();
         let system = shared.system();
         Equations {
             shared,
             states: system.states(),
-            newton: implicit.then(|| Newton::new(&*system, &context)),
+            newton: implicit.map(|allowed| Newton::new(&*system, allowed, &context)),
             context,
         }
     }

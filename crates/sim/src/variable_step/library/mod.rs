@@ -73,9 +73,10 @@ fn problem<'s, M: Matrix<T = f64>>(
     implicit_share: Option<f64>,
 ) -> OdeSolverProblem<Equations<'s, M>> {
     let share = implicit_share.unwrap_or(1.0);
+    let relative = (share * tolerances.relative()).max(LEAST);
     OdeSolverProblem {
-        eqn: Equations::new(shared, implicit_share.is_some()),
-        rtol: (share * tolerances.relative()).max(LEAST),
+        eqn: Equations::new(shared, implicit_share.map(|share| (relative, tolerances.absolute(share)))),
+        rtol: relative,
         atol: M::V::from_vec(tolerances.absolute(share), M::C::default()),
         t0: 0.0,
         h0: 1.0,

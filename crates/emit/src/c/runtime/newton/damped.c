@@ -21,26 +21,10 @@ static $real ha_jacobian_change(const ha_newton *w)
     return change;
 }
 
-//item ha_residuals_decrease
-/* Whether no residual evaluated last is greater than those stored in w->simplified, and one is less. */
-static int ha_residuals_decrease(const ha_newton *w)
-{
-    int less = 0;
-    int i;
-    for (i = 0; i < w->n; ++i) {
-        const $real now = $fabs(w->right[i] - w->offset[i]);
-        if (!(now <= w->simplified[i])) {
-            return 0;
-        }
-        less = less || now < w->simplified[i];
-    }
-    return less;
-}
-
 //item ha_crosses_nonsmooth_point
-/* Goes along the correction to just beyond where the Jacobian jumps, if no residual grows on that way: where the derivative
- * of a law jumps, Newton's model ends. Ends with an evaluation of the trial point, or at w->x. */
-static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w)
+/* Goes along the correction, which is norm long, to just beyond where the Jacobian jumps: where the derivative of a law jumps,
+ * Newton's model ends. Ends with an evaluation of the trial point, or at w->x. */
+static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w, $real norm)
 {
     $real before = $0.0;
     $real beyond = $1.0;
@@ -50,9 +34,6 @@ static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w)
         return 0;
     }
     $ha_copy(w->jacobian, w->matrix, w->entries);
-    for (i = 0; i < w->n; ++i) {
-        w->simplified[i] = $fabs(w->right[i] - w->offset[i]);
-    }
     for (halving = 0; halving < 60; ++halving) {
         int finite;
         $real change;
@@ -63,7 +44,8 @@ static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w)
         finite = $ha_evaluate(m, w, w->trial);
         change = finite ? $ha_jacobian_change(w) : $HUGE_VAL;
         if (change > $0.5) {
-            if (beyond - before <= $1e-3 * beyond && finite && $ha_residuals_decrease(w)) {
+            if (finite && beyond - before <= $1e-3 * beyond
+                && $ha_simplified_correction_norm(w, 0) <= ($1.0 - $0.25 * beyond) * norm) {
                 return 1;
             }
             beyond = $0.5 * (before + beyond);
@@ -119,7 +101,7 @@ static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalizati
             break;
         }
     }
-    if (globalization == HA_DAMPED && $ha_crosses_nonsmooth_point(m, w)) {
+    if (globalization == HA_DAMPED && $ha_crosses_nonsmooth_point(m, w, norm)) {
         $ha_accept_trial(w);
         *contracts = 0;
         return HA_ACCEPTED;
