@@ -535,6 +535,12 @@ impl Reader<'_, '_> {
         let column = |symbol: Symbol, column: &[f64]| {
             [moved.iter().filter(|(s, _)| *s == symbol).fold(column[sample], |at, (_, by)| at + by)]
         };
+        // Behind the last sample tables may have ended.
+        let ends = sample + 1 == values.times.len() && t > values.times[sample];
+        let has_value = |found: &[[f64; 1]]| found.as_flattened().iter().all(|value| !value.is_nan());
+        if ends && !has_value(read.at(&read.wanted, room, [t], &column)) {
+            return Some(read.at(&read.wanted, room, [values.times[sample]], &column).as_flattened());
+        }
         Some(read.at(&read.wanted, room, [t], &column).as_flattened())
     }
 }

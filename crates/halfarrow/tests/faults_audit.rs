@@ -524,3 +524,16 @@ fn wrong_laws(source: &str, times: &[f64], columns: &Columns) -> usize {
     }
     caught
 }
+
+/// A table that ends where the run ends has its last value there.
+#[test]
+fn a_table_may_end_with_the_run() {
+    let folder = std::env::temp_dir().join(format!("halfarrow_table_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    std::fs::write(folder.join("rows.csv"), "t,u\n0,1\n4,2\n10,1\n").expect("a table");
+    let text = "model Table\nSf:s(table(\"rows.csv\", t)) -> 0:a -> C:c(1)\na -> R:r(1)\n";
+    std::fs::write(folder.join("table.bond"), text).expect("a model");
+    let model = Model::load(&folder.join("table.bond"), &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    assert!(run_or_none(&model, &Run { to: 10.0, ..Run::default() }).is_none());
+    std::fs::remove_dir_all(&folder).expect("the folder is there");
+}

@@ -732,3 +732,26 @@ fn nets_of_orifices_start_as_nets_of_pipes_do() {
         }
     }
 }
+
+/// Rest is found from where laws are flat, or infinitely steep: the slope there says nothing of what is further on.
+#[test]
+fn rest_is_found_from_where_laws_are_flat() {
+    let models = [
+        ("Se:res(50) -> 1:p -> I:q(20)\np -> R:fr(e = 3*f*abs(f))", "q.f", (50.0_f64 / 3.0).sqrt()),
+        ("Se:s(5) -> 1:w -> I:m(2)\nw -> C:k(e = 4*q^3)\nw -> R:d(1)", "k.q", 1.25_f64.cbrt()),
+        ("Sf:s(100) -> 0:a -> C:c1(100)\na -> R:w(f = 2*sign(e)*abs(e)^1.25)", "c1.e", 50.0_f64.powf(0.8)),
+        (
+            "Sf:s(0.3) -> 0:a -> C:c1(1)\na -> 1:x -> 0:b -> C:c2(2)\nx -> R:o(f = 0.2*sign(e)*sqrt(abs(e)))\nb -> R:o2(1)",
+            "c1.e",
+            2.55,
+        ),
+    ];
+    for (model, name, wanted) in models {
+        let model = Model::from_text("text.bond", &format!("model M\n{model}\n"), &[]).expect("a model");
+        let asked =
+            Run { to: 1.0, start: Start::Equilibrium, record: Record::Names(vec![name.into()]), ..Run::default() };
+        let done = model.simulate(&asked, &mut |_| true).unwrap_or_else(|error| panic!("{}", error.render(false)));
+        let found = done.trace.columns[0].values[0];
+        assert!((found - wanted).abs() <= 1e-5 * wanted, "{name}: {found}, not {wanted}");
+    }
+}

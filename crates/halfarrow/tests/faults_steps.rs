@@ -565,3 +565,140 @@ fn a_net_without_storages_passes_its_corner() {
         assert_eq!(done.report.audit.verdict, Verdict::Holds, "{method:?}");
     }
 }
+
+/// The value at the end of a run, by name.
+fn end_of(done: &Simulated, name: &str) -> f64 {
+    let column = done.trace.columns.iter().find(|column| column.name == name).unwrap_or_else(|| panic!("{name}"));
+    *column.values.last().expect("samples")
+}
+
+/// While a valve or a diode blocks, nothing that moves tells how a source swings: steps went over whole pulses, without a word.
+/// References by SciPy's Radau with steps of a fraction of a period (3e-7 off).
+#[test]
+fn pulses_through_valves_and_diodes_are_not_stepped_over() {
+    let rectifier = |law: &str| {
+        text(&format!(
+            "model Rectifier\nSe:v(10*sin(314*t)) -> 1:l -> R:d({law})\nl -> 0:o -> C:c(1e-3)\no -> R:load(1e4)\n"
+        ))
+    };
+    let valve = |law: &str| {
+        text(&format!(
+            "model Valve\nSe:v(10*sin(7*t)) -> 1:l -> R:d({law})\nl -> 0:o -> C:c(0.2)\no -> R:out(f = 0.02*e)\n"
+        ))
+    };
+    let diode = text(
+        "model Diode\nSe:v(10*sin(2*pi*50*t)) -> 1:l -> R:r(1)\nl -> R:d(f = 1e-9*(exp(e/0.02585) - 1))\n\
+         l -> 0:o -> C:c(1e-3)\no -> R:load(1e4)\n",
+    );
+    let pulses = text("model Pulses\nSe:v(sin(2*pi*t)^40) -> 1:l -> R:r(1)\nl -> 0:o -> C:c(10)\n");
+    let cases = [
+        (rectifier("f = if e > 0 then e else 0"), 2.0, 9.947406),
+        (rectifier("f = max(e, 0)"), 2.0, 9.947406),
+        (valve("f = 0.5*max(e, 0)"), 8.0, 7.643525),
+        (valve("f = max(0.5*e, 0)"), 8.0, 7.643525),
+        (diode, 2.0, 9.51068),
+        (pulses, 100.0, 0.125352),
+    ];
+    for (model, to, wanted) in &cases {
+        for method in [Method::Auto, Method::Radau, Method::Bdf] {
+            for rtol in [1e-6, 1e-9] {
+                let record = Record::Names(vec!["c.e".into()]);
+                let done = run(model, Run { to: *to, method, rtol, record, ..Run::default() });
+                let off = (end_of(&done, "c.e") - wanted).abs() / wanted;
+                assert!(off <= 5e-6 + 100.0 * rtol, "{method:?} at {rtol:e}: {off:e} of {wanted}");
+            }
+        }
+    }
+}
+
+/// A condition on the sine of an angle may hold many times within a step.
+#[test]
+fn every_tooth_of_a_wheel_is_counted() {
+    for (bearing, to, teeth) in [("", 2.0, 32.0), ("w -> R:b(0.01)\n", 20.0, 289.0)] {
+        let model = text(&format!(
+            "model Tooth\ndiscrete n = 0\n1:w -> I:j(1, f0 = 10)\n{bearing}state th' = w.f\n\
+             when sin(10*th) > 0.95 {{ n = n + 1 }}\noutput count = n\n"
+        ));
+        for method in [Method::Auto, Method::Radau, Method::Bdf, Method::Explicit] {
+            for rtol in [1e-4, 1e-6, 1e-9] {
+                let done = run(
+                    &model,
+                    Run { to, method, rtol, record: Record::Names(vec!["count".into()]), ..Run::default() },
+                );
+                assert_eq!(end_of(&done, "count"), teeth, "{method:?} at {rtol:e}");
+            }
+        }
+    }
+}
+
+/// Nets of resistances that all are flat where nothing flows, driven through it: of a resistance `R` and two side by side the whole is
+/// `R + 1/(1 + 1/sqrt(2))^2`.
+#[test]
+fn nets_of_squares_pass_zero() {
+    let parallel = "R:r1(e = f*abs(f))\na -> 0:p -> R:r2(e = f*abs(f))\np -> R:r3(e = 2*f*abs(f))\n";
+    for phase in [0.0, 0.5] {
+        let model = text(&format!("model Par\nSe:v(sin(t + {phase})) -> 1:a -> {parallel}"));
+        for (method, step) in [(Method::Auto, None), (Method::Fixed(FixedMethod::Rk4), Some(0.01))] {
+            let asked = Run {
+                to: 6.0,
+                method,
+                step,
+                every: Some(0.1),
+                record: Record::Names(vec!["r1.f".into()]),
+                ..Run::default()
+            };
+            let done = run(&model, asked);
+            let whole = 1.0 + (1.0 + 0.5_f64.sqrt()).powi(-2);
+            let flow = &done.trace.columns[0].values;
+            for (t, flow) in done.trace.times.iter().zip(flow) {
+                let source = (t + phase).sin();
+                let wanted = (source.abs() / whole).sqrt().copysign(source);
+                assert!((flow - wanted).abs() <= 1e-7, "{method:?}: {flow}, not {wanted}, at {t} s");
+            }
+        }
+    }
+}
+
+/// Tanks that level out through resistances which meet without a storage come to rest: at the mean level, where their capacitances
+/// are weighed.
+#[test]
+fn tanks_level_out_through_resistances_in_a_row_and_in_a_star() {
+    let row = "a -> 1:p -> 0:m -> 1:q -> 0:b -> C:c2(0.2)\np -> R:o1(e = 100*f*abs(f))\nq -> R:o2(e = 25*f*abs(f))\n";
+    let one = "a -> 1:p -> 0:b -> C:c2(0.2)\np -> R:o1(e = 100*f*abs(f))\np -> R:o2(e = 25*f*abs(f))\n";
+    let star = "a -> 1:p -> 0:m -> 1:q -> 0:b -> C:c2(0.2)\np -> R:o1(e = 100*f*abs(f))\nq -> R:o2(e = 25*f*abs(f))\n\
+                m -> 1:s -> C:c3(0.1)\ns -> R:o3(e = 50*f*abs(f))\n";
+    for (net, level) in [(row, 2.0 / 3.0), (one, 2.0 / 3.0), (star, 0.5)] {
+        let model = text(&format!("model Net\n0:a -> C:c1(0.1, e0 = 2)\n{net}"));
+        for method in [Method::Auto, Method::Bdf] {
+            for rtol in [1e-6, 1e-9] {
+                let record = Record::Names(vec!["c1.e".into(), "c2.e".into()]);
+                let done = run(&model, Run { to: 10.0, method, rtol, record, ..Run::default() });
+                assert!(done.report.steps <= 1500, "{method:?} at {rtol:e}: {} steps", done.report.steps);
+                for name in ["c1.e", "c2.e"] {
+                    assert!((end_of(&done, name) - level).abs() <= 100.0 * rtol, "{method:?} at {rtol:e}: {name}");
+                }
+            }
+        }
+    }
+}
+
+/// A root that is 0 on one side, in an iteration: its slope has no end where the valve closes. The reference is the same by SciPy.
+#[test]
+fn a_valve_in_an_iteration_closes() {
+    let model = text(
+        "model Chk\nSe:b(2*sin(3*t + 1)) -> 1:y -> 0:n -> C:c(0.5)\ny -> R:cv(f = sqrt(max(e, 0)))\ny -> R:g(1)\n",
+    );
+    for (method, step) in [
+        (Method::Auto, None),
+        (Method::Bdf, None),
+        (Method::Radau, None),
+        (Method::Fixed(FixedMethod::Rk4), Some(1e-3)),
+    ] {
+        let done =
+            run(&model, Run { to: 6.0, method, step, record: Record::Names(vec!["c.e".into()]), ..Run::default() });
+        assert!((end_of(&done, "c.e") - 1.59354).abs() <= 5e-5, "{method:?}: {}", end_of(&done, "c.e"));
+    }
+    let halves =
+        text("model Halves\nSe:s(1 + sin(t)) -> 1:x -> R:o(f = sqrt(max(e, 0)) - sqrt(max(-e, 0)))\nx -> R:r(1)\n");
+    run(&halves, Run { to: 6.0, ..Run::default() });
+}

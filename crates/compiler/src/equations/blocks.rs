@@ -18,6 +18,8 @@ use crate::bond_graph::{ElementId, Meaning};
 use crate::causal_graph::{break_set::break_set, break_set::passed_over, rank_given};
 use crate::sparse::{Pattern, SparseMatrix};
 
+/// Steps between an unknown and its equation up to which its root is looked for in writing.
+const SHORT_BODY: usize = 12;
 /// Terms that may be formed in the search for short forms of the entries of a matrix.
 const WORK: u64 = 1_000_000;
 /// Entries that are written longer than this stay products of sums, as they come about.
@@ -187,6 +189,11 @@ fn block(
     let (torn, body, residuals) = kept_sparse(&mut d.x, torn, body, residuals);
     let forms = if positions { None } else { linear(&mut d.x, &torn, &body, &residuals) };
     let Some((named, mut rows)) = forms else {
+        if let Some(root) = written_root(d, &torn, &body, &residuals).filter(|_| !positions) {
+            ordered.assign(vec![(torn[0], root)]);
+            ordered.assign(body);
+            return Ok(());
+        }
         let (inner, elements) = (body.clone(), elements_of(d, &symbols));
         ordered.steps.push(NewtonBlock { unknowns: torn, body: inner, residuals, elements }.into());
         ordered.assign(body);
@@ -206,6 +213,17 @@ fn block(
     solve_rows(d, torn, rows, &symbols, ordered)?;
     ordered.assign(body);
     Ok(())
+}
+
+/// The root of one equation in one unknown, if it can be written down and has a value everywhere: that of resistances in a row
+/// whose laws are alike.
+fn written_root(d: &mut Definitions, torn: &[Symbol], body: &[(Symbol, Expr)], residuals: &[Expr]) -> Option<Expr> {
+    let &[unknown] = torn else { return None };
+    if body.len() > SHORT_BODY {
+        return None;
+    }
+    let residual = substituted(&mut d.x, body, residuals)[0];
+    d.solve_for(residual, unknown).filter(|&root| d.x.total(root))
 }
 
 /// Steps that solve linear equations, coefficients by the places of their unknowns and the rest. `members`: all variables of

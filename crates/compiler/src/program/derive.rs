@@ -81,6 +81,28 @@ impl Values {
     pub(super) fn derivative(&mut self, value: Value, d: &dyn Fn(Value) -> Option<Value>) -> Option<Value> {
         self.op(value).derivative(self, value, |_, operand| (operand, d(operand)))
     }
+
+    /// A slope times a rate: none where nothing moves, as on the side of a root of `max(a, 0)` on which that is 0, even if the slope
+    /// has no end there.
+    fn product_of_slope(&mut self, slope: Value, rate: Value) -> Value {
+        let zero = Values::number(self, 0.0);
+        match self.op(rate) {
+            Op::Select(c, a, b) if (a == zero || b == zero) && self.may_be_infinite(slope) => {
+                let [a, b] = [a, b].map(|side| if side == zero { zero } else { self.times(slope, side) });
+                Values::select(self, c, a, b)
+            }
+            _ => self.times(slope, rate),
+        }
+    }
+
+    fn may_be_infinite(&self, slope: Value) -> bool {
+        match self.op(slope) {
+            Op::Div(..) | Op::Pow(..) => true,
+            Op::Neg(a) => self.may_be_infinite(a),
+            Op::Mul(a, b) => self.may_be_infinite(a) || self.may_be_infinite(b),
+            _ => false,
+        }
+    }
 }
 
 /// Values as numbers: what is trivial is left out.
@@ -115,7 +137,7 @@ impl Calculus for Values {
     }
     fn along(&mut self, slope: impl FnOnce(&mut Self) -> Value, rate: Value) -> Value {
         let slope = slope(self);
-        self.times(slope, rate)
+        self.product_of_slope(slope, rate)
     }
     fn along_power(&mut self, value: Value, (a, da): Moving<Self>, (b, db): Moving<Self>) -> Option<Value> {
         let left = da.map(|da| {
@@ -123,7 +145,7 @@ impl Calculus for Values {
             let less = self.minus(b, one);
             let power = self.op_of(Op::Pow(a, less));
             let slope = self.times(b, power);
-            self.times(slope, da)
+            self.product_of_slope(slope, da)
         });
         let right = db.map(|db| {
             let log = self.op_of(Op::Call(Function::Log, a));

@@ -1,6 +1,7 @@
 //! Expressions to values.
 
 use super::op::Op;
+use super::roots::FreeSides;
 use super::sharing::{Sharing, Unit, UnitId};
 use super::values::{Reads, Values};
 use super::{BlockId, ConditionId, ConditionKind, Value};
@@ -21,8 +22,10 @@ pub(super) struct Lowering<'a> {
     known: Vec<Option<Value>>,
     /// Sums whose sine and cosine are made of those of their terms.
     sums: FxHashSet<Expr>,
-    /// Functions and comparisons whose sides are passed without an event.
-    free: FxHashSet<Expr>,
+    /// Functions and comparisons whose sides are passed without an event, and whether one of them stands in an iteration: what that
+    /// solves may be as steep as its inverse.
+    free: FreeSides,
+    iterated: bool,
     /// Whether what is being lowered is one of them.
     passing: bool,
     sharing: Rc<Sharing>,
@@ -39,7 +42,7 @@ struct Inner {
 
 impl<'a> Lowering<'a> {
     /// `sums`: those of angles that are taken apart; `free`: what [`free_sides`](super::roots::free_sides) gives.
-    pub fn new(exprs: &'a Exprs, (sums, free): (FxHashSet<Expr>, FxHashSet<Expr>), sharing: Sharing) -> Self {
+    pub fn new(exprs: &'a Exprs, (sums, free): (FxHashSet<Expr>, FreeSides), sharing: Sharing) -> Self {
         Lowering {
             exprs,
             values: Values::default(),
@@ -49,6 +52,7 @@ impl<'a> Lowering<'a> {
             known: vec![None; exprs.len()],
             sums,
             free,
+            iterated: false,
             passing: false,
             sharing: Rc::new(sharing),
             inner: None,
@@ -107,6 +111,7 @@ impl<'a> Lowering<'a> {
     /// Lowers an expression whose parts are lowered.
     fn node_of(&mut self, e: Expr) -> Value {
         self.passing = self.passes_freely(e);
+        self.iterated |= self.inner.is_some() && (self.free.steep.contains(&e) || self.free.smooth.contains(&e));
         let value = self.node(e);
         match &mut self.inner {
             Some(inner) => {
@@ -373,7 +378,7 @@ impl<'a> Lowering<'a> {
     fn passes_freely(&self, e: Expr) -> bool {
         let moves = |part| self.known(part).is_some_and(|part| self.values.reads(part).includes(Reads::STATE));
         let mut moved = false;
-        if self.free.contains(&e) {
+        if self.free.steep.contains(&e) || self.free.smooth.contains(&e) {
             self.exprs.node(e).for_each_child(|part| moved |= moves(part));
         }
         moved
@@ -381,7 +386,7 @@ impl<'a> Lowering<'a> {
 
     /// Whether any of them is.
     pub fn is_steep(&self) -> bool {
-        self.free.iter().any(|&e| self.passes_freely(e))
+        self.iterated || self.free.steep.iter().any(|&e| self.passes_freely(e))
     }
 
     fn call(&mut self, f: Function, a: Value, b: Option<Value>) -> Value {

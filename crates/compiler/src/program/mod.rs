@@ -40,6 +40,7 @@ mod samples;
 mod schedule;
 mod sharing;
 mod start;
+mod swings;
 mod triggers;
 mod values;
 mod verify;

@@ -1,4 +1,4 @@
-//! Which sides are passed without an event: those of roots at 0, as in `sign(a) sqrt(abs(a))`.
+//! Which sides are passed without an event: those of roots at 0, as in `sign(a) sqrt(abs(a))`, and of their inverses, `a abs(a)`.
 //!
 //! Such a law is continuous, but infinitely steep at 0. Where states come to rest there, as the levels of two tanks do, each
 //! side that is held leads to the other one, over and over.
@@ -7,15 +7,24 @@ use crate::algebra::{Comparison, Expr, Exprs, Function, Node};
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
-/// Functions and comparisons that nothing reads but roots which are continuous where these change their side: `abs(a)` under
-/// a root, `sign(a)` beside one of `abs(a)`, `a > 0` where it chooses between roots of `a` and `-a`. Where one side of a law is 0,
-/// as that of `max(a, 0)`, nothing but an event tells what comes on the other. `exprs` is all that is evaluated, parts and wholes, `wholes` what is read by name; `varies` tells what more than
+/// Functions and comparisons whose sides are passed without an event.
+#[derive(Debug, Default)]
+pub(super) struct FreeSides {
+    /// Those that nothing reads but roots which are continuous where these change their side: `abs(a)` under a root, `sign(a)`
+    /// beside one of `abs(a)`, `a > 0` where it chooses between roots of `a` and `-a`.
+    pub steep: FxHashSet<Expr>,
+    /// Those that squares with a sign read, `a abs(a)`, which are smooth.
+    pub smooth: FxHashSet<Expr>,
+}
+
+/// The sides that are passed without an event. Where one side of a law is 0, as that of `max(a, 0)`, nothing but an event tells
+/// what comes on the other. `exprs` is all that is evaluated, parts and wholes, `wholes` what is read by name; `varies` tells what more than
 /// parameters determine.
-pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dyn Fn(Expr) -> bool) -> FxHashSet<Expr> {
+pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dyn Fn(Expr) -> bool) -> FreeSides {
     let roots = Roots { x, varies };
-    let mut free: FxHashSet<Expr> = exprs.iter().copied().filter(|&e| roots.is_side(e)).collect();
-    if free.is_empty() {
-        return free;
+    let sides: FxHashSet<Expr> = exprs.iter().copied().filter(|&e| roots.is_side(e)).collect();
+    if sides.is_empty() {
+        return FreeSides::default();
     }
     let wholes: FxHashSet<Expr> = wholes.iter().copied().collect();
     let mut readers: FxHashMap<Expr, Vec<Expr>> = FxHashMap::default();
@@ -32,11 +41,20 @@ pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dy
         let product = |reader: Expr| matches!(x.node(reader), Node::Mul(_)) && all_read(reader, &is_root_of(reader));
         move |reader: Expr| is_root_of(e)(reader) || product(reader)
     };
-    free.retain(|&e| match x.node(e) {
-        Node::Call(Function::Sign, _) => all_read(e, &|reader| roots.has_root_beside(reader, e)),
-        Node::Compare(..) => all_read(e, &|reader| roots.chooses_between_roots(reader, e)),
-        _ => all_read(e, &leads_to_roots(e)),
-    });
+    let mut free = FreeSides::default();
+    for e in sides {
+        let steep = match x.node(e) {
+            Node::Call(Function::Sign, _) => all_read(e, &|reader| roots.has_root_beside(reader, e)),
+            Node::Compare(..) => all_read(e, &|reader| roots.chooses_between_roots(reader, e)),
+            _ => all_read(e, &leads_to_roots(e)),
+        };
+        let smooth = || all_read(e, &|reader| leads_to_roots(e)(reader) || roots.is_square(reader, e));
+        if steep {
+            free.steep.insert(e);
+        } else if smooth() {
+            free.smooth.insert(e);
+        }
+    }
     free
 }
 
@@ -104,6 +122,13 @@ impl Roots<'_> {
     fn has_root_beside(&self, product: Expr, sign: Expr) -> bool {
         let Node::Call(Function::Sign, a) = self.x.node(sign) else { return false };
         matches!(self.x.node(product), Node::Mul(_)) && self.has_root(product, &self.core(a[0]))
+    }
+
+    /// Whether a product has both `abs(a)` and `a` for factors: a square with a sign, which is smooth.
+    fn is_square(&self, product: Expr, magnitude: Expr) -> bool {
+        let Node::Call(Function::Abs, a) = self.x.node(magnitude) else { return false };
+        let (core, factors) = (self.core(a[0]), self.factors(product));
+        matches!(self.x.node(product), Node::Mul(_)) && core.iter().all(|part| factors.contains(part))
     }
 
     fn chooses_between_roots(&self, choice: Expr, comparison: Expr) -> bool {

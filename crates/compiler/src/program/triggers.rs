@@ -49,6 +49,11 @@ fn events(
     }
 }
 
+/// Which values time alone moves, each in proportion to it.
+pub(super) fn linear_in_time(flow: Dataflow<'_>, tables: &[Table1d]) -> Vec<bool> {
+    degrees(flow, tables).into_iter().map(|degree| degree == Degree::Line).collect()
+}
+
 /// How a value depends on time while conditions are held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Degree {

@@ -7,6 +7,9 @@ use halfarrow_compiler::program::{ConditionId, EventTrigger, Program, Value};
 /// Evaluations in one search for a zero crossing; at its end the run makes a stop at which nothing changes.
 const SEARCH: usize = 4000;
 
+/// Part of a turn, in rad, by which a source that swings goes on in a step.
+const SWING: f64 = std::f64::consts::FRAC_PI_4;
+
 /// Depth beyond a border, relative to the values around it, below which it may be rounding.
 const SHALLOW: f64 = 1e-9;
 
@@ -16,22 +19,45 @@ pub(super) struct Clock {
     conditions: Vec<(ConditionId, EventTrigger)>,
     /// Computes their operands.
     routine: Routine,
+    /// Computes angles that turn with time.
+    swings: Routine,
     time: usize,
 }
 
 impl Clock {
-    pub fn new(program: &Program, layout: &Layout) -> Clock {
+    /// `seen`: what time moves, rates and indicators of events.
+    pub fn new(program: &Program, layout: &Layout, seen: &[Value]) -> Clock {
         let timed = program
             .conditions
             .iter()
             .filter(|(_, c)| matches!(c.trigger, EventTrigger::LinearTime | EventTrigger::CurvedTime));
         let (conditions, operands): (Vec<_>, Vec<Value>) = timed.map(|(id, c)| ((id, c.trigger), c.operand)).unzip();
         let routine = layout.routine(program, &operands);
-        Clock { conditions, routine, time: layout.time as usize }
+        let swings = layout.routine(program, &program.turned_by_time(seen));
+        Clock { conditions, routine, swings, time: layout.time as usize }
+    }
+
+    /// How long a step may be that shows how sources swing, in s: what they do in a longer one no error tells where nothing lets it
+    /// through at its ends.
+    pub fn longest_step(&self, frame: &mut Frame, t: f64) -> f64 {
+        if self.swings.outputs.is_empty() {
+            return f64::INFINITY;
+        }
+        frame.r[self.time] = t;
+        frame.d[self.time] = 1.0;
+        // Time alone is read.
+        let _ = frame.run_along(&self.swings);
+        frame.d[self.time] = 0.0;
+        let rates = self.swings.outputs.iter().map(|&register| frame.d[register as usize].abs());
+        SWING / rates.filter(|rate| rate.is_finite()).fold(0.0, f64::max)
     }
 
     pub fn routine(&self) -> &Routine {
         &self.routine
+    }
+
+    pub fn routines(&self) -> impl Iterator<Item = &Routine> {
+        [&self.routine, &self.swings].into_iter()
     }
 
     /// The conditions, in the order of the outputs of the routine.

@@ -228,7 +228,7 @@ pub(super) struct Mode {
     pub solution_batches: Option<Arc<BlockBatches>>,
     /// Conditions of the state, whose operands are the event indicators.
     pub switching: Vec<ConditionId>,
-    /// Computes these operands.
+    /// Computes these operands, and behind them the angles that they read.
     pub indicators: Routine,
     pub clock: Clock,
     /// Computes what is delayed or sampled.
@@ -275,6 +275,8 @@ impl Mode {
         let sources: Vec<Value> = program.held.iter().map(|h| h.source).collect();
         let of_state = || program.conditions.iter().filter(|(_, c)| c.trigger == EventTrigger::State);
         let operands: Vec<Value> = of_state().map(|(_, c)| c.operand).collect();
+        let angles = program.angles(&operands);
+        let seen: Vec<Value> = program.states.iter().map(|s| s.rate).chain(operands.iter().copied()).collect();
         let assumed: Vec<Value> = program.assumptions.iter().flat_map(|a| [a.value, a.scale]).collect();
         let sparsity = sparsity_of(&program);
         let read: Vec<BlockId> = rates.solves.iter().map(|solve| solve.block).collect();
@@ -291,8 +293,8 @@ impl Mode {
             rates,
             solutions,
             switching: of_state().map(|(id, _)| id).collect(),
-            indicators: layout.routine(&program, &operands),
-            clock: Clock::new(&program, &layout),
+            indicators: layout.routine(&program, &[&operands[..], &angles].concat()),
+            clock: Clock::new(&program, &layout, &seen),
             sources: layout.routine(&program, &sources),
             kept: ConservedSums::of(&program, &layout),
             clauses: Clauses::of(&program, &layout),
@@ -331,7 +333,7 @@ impl Mode {
             .chain(&self.solutions)
             .chain(self.exchanges.iter().flat_map(Ratios::routines))
             .chain(self.bounds.iter().flat_map(Bounds::routines));
-        [rates, preamble, assumed, sources, indicators, clock.routine()].into_iter().chain(more)
+        [rates, preamble, assumed, sources, indicators].into_iter().chain(clock.routines()).chain(more)
     }
 }
 

@@ -163,7 +163,7 @@ impl Model {
         self.frame.conditions.state = Hold::Follow;
         // Solutions of nonlinear laws may jump at an event.
         self.leave_solutions();
-        self.code.clock.handle_time_event(&mut self.frame, t, &mut self.run.clock_event);
+        self.handle_time_event(t);
         if !self.run.begun {
             self.begin_delays_and_samples(t, x)?;
             self.vary_begin(t, x)?;
@@ -263,6 +263,14 @@ impl Model {
     }
 }
 
+impl Model {
+    /// Takes conditions on time as they are just after `t`, and looks when the first of them changes.
+    pub(super) fn handle_time_event(&mut self, t: f64) {
+        self.code.clock.handle_time_event(&mut self.frame, t, &mut self.run.clock_event);
+        self.run.longest_step = self.code.clock.longest_step(&mut self.frame, t);
+    }
+}
+
 impl Events for Model {
     fn next_time_event(&mut self, t: f64) -> Option<f64> {
         let inputs = self.inputs().iter().filter_map(|signal| signal.next_corner(t));
@@ -316,7 +324,7 @@ impl Events for Model {
     fn longest_step(&self) -> f64 {
         let idle = self.code.motion.iter().chain(&self.recorded.motion).flat_map(|motion| &motion.idle);
         let longest = idle.map(|block| self.frame.solvers[block.0 as usize].newton.longest_way());
-        longest.fold(f64::INFINITY, f64::min)
+        longest.fold(self.run.longest_step, f64::min)
     }
 
     fn stands_still(&self) -> bool {
@@ -407,6 +415,12 @@ impl Events for Model {
             next += count;
         }
         Ok(())
+    }
+
+    fn angles(&self, angles: &mut Vec<f64>) {
+        let registers = &self.code.indicators.outputs[self.code.switching.len()..];
+        angles.clear();
+        angles.extend(registers.iter().map(|&register| self.frame.r[register as usize]));
     }
 
     fn observed(&self) -> usize {

@@ -320,7 +320,7 @@ impl Model {
         }
         self.frame.conditions.clock = Hold::Follow;
         self.frame.conditions.state = Hold::Follow;
-        self.code.clock.handle_time_event(&mut self.frame, self.run.crossed, &mut self.run.clock_event);
+        self.handle_time_event(self.run.crossed);
         self.start_solutions_at(values);
         if !self.take_values(t, x, values)? {
             return Ok(false);

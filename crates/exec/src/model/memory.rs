@@ -43,6 +43,8 @@ pub(super) struct Remembered {
     pub signs_taken: Option<f64>,
     /// When time moves a condition next, in s.
     pub clock_event: Option<f64>,
+    /// The longest step that shows how sources swing, in s.
+    pub longest_step: f64,
     /// Values of the conserved constants.
     pub conserved: Vec<f64>,
     /// Values of the positions that iterations determine, as the last start has found them.

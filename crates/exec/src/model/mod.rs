@@ -135,6 +135,7 @@ impl Model {
             crossed: f64::NEG_INFINITY,
             signs_taken: None,
             clock_event: None,
+            longest_step: f64::INFINITY,
             conserved: vec![0.0; code.program.conserved.len()],
             positions: vec![0.0; code.program.positions.len()],
             first: None,

@@ -429,7 +429,7 @@ impl Instant<'_> {
         model.frame.conditions.clock = Hold::Follow;
         model.frame.conditions.state = Hold::Follow;
         let code = model.code.clone();
-        code.clock.handle_time_event(&mut model.frame, model.run.crossed, &mut model.run.clock_event);
+        model.handle_time_event(model.run.crossed);
         model.start_solutions_at(&self.values);
         let value = |symbol: &Symbol| self.values.get(symbol).copied().filter(|v| v.is_finite()).unwrap_or(0.0);
         x.fill(0.0);

@@ -68,6 +68,9 @@ pub(crate) struct Run<'a> {
     exchanged_at: Option<f64>,
 }
 
+/// How far a step may go beyond the longest one where that ends an interval.
+const STRETCH: f64 = 1.1;
+
 impl<'a> Run<'a> {
     /// A run that stands at its start.
     pub(crate) fn new(options: &'a Options, sink: &'a mut dyn Sink, events: &dyn Events) -> Run<'a> {
@@ -216,7 +219,8 @@ impl<'a> Run<'a> {
         point: &mut [f64],
     ) -> Result<StopReason, Failure> {
         let longest = if S::DENSE { stepper.events().longest_step() } else { f64::INFINITY };
-        let latest = f64::min(stop.time, self.time + longest);
+        // What would be left for the last step is divided with it.
+        let latest = if stop.time - self.time <= STRETCH * longest { stop.time } else { self.time + longest };
         let end = match stepper.step(self.time, self.next_sample(), latest, point) {
             Ok(end) => end,
             // Where other variables have been tried already they do not help.

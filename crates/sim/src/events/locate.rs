@@ -7,6 +7,12 @@ use crate::Failure;
 /// Parts of a step at whose ends the signs are looked at: a pulse as short as one part is not missed.
 const PARTS: usize = 4;
 
+/// What angles may go on by in a piece of a step, in rad, so that a part of it shows what indicators do that read their sines.
+const TURN: f64 = std::f64::consts::FRAC_PI_2;
+
+/// Pieces of a step at most.
+const MOST_PIECES: f64 = 1e6;
+
 /// Halvings of the bracket of a crossing at most.
 const MOST_BISECTIONS: usize = 80;
 
@@ -32,6 +38,43 @@ pub(crate) fn first_crossing(
     if signs.is_empty() {
         return Ok(None);
     }
+    let pieces = pieces(signs, (start, end), &mut crossed)?;
+    let time = |piece: usize| if piece == pieces { end } else { start + (end - start) * piece as f64 / pieces as f64 };
+    for piece in 0..pieces {
+        if let Some(found) = first_in_piece(signs, time(piece), time(piece + 1), &mut crossed)? {
+            return Ok(Some(found));
+        }
+    }
+    Ok(None)
+}
+
+/// How many pieces of a step show all that indicators do that read sines of angles.
+fn pieces(
+    signs: &mut Signs,
+    (start, end): (f64, f64),
+    crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
+) -> Result<usize, Failure> {
+    if signs.angles.is_empty() {
+        return Ok(1);
+    }
+    signs.sharpen(None);
+    crossed(signs, start)?;
+    let before = signs.angles.clone();
+    // Beyond a crossing there need be no values.
+    if crossed(signs, end).is_err() {
+        return Ok(1);
+    }
+    let turned = before.iter().zip(&signs.angles).map(|(before, after)| (after - before).abs()).fold(0.0, f64::max);
+    Ok((turned / TURN).ceil().clamp(1.0, MOST_PIECES) as usize)
+}
+
+/// The same in a piece of a step.
+fn first_in_piece(
+    signs: &mut Signs,
+    start: f64,
+    end: f64,
+    crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
+) -> Result<Option<(f64, usize)>, Failure> {
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
     let finest = FINEST * (end - start);
     let (thorough, mut looks) = (signs.thorough, 0);
@@ -41,13 +84,13 @@ pub(crate) fn first_crossing(
     for part in 1..=PARTS {
         let found = crossed(signs, time(part))?;
         if found.is_some() {
-            return bisect(signs, (time(part - 1), time(part)), finest, found, &mut crossed);
+            return bisect(signs, (time(part - 1), time(part)), finest, found, crossed);
         }
         signs.keep(part);
         if thorough {
             let ends = (part, time(part - 1), time(part));
-            if let Some((before, middle, found)) = hidden(signs, ends, &mut looks, &mut crossed)? {
-                return bisect(signs, (before, middle), finest, Some(found), &mut crossed);
+            if let Some((before, middle, found)) = hidden(signs, ends, &mut looks, crossed)? {
+                return bisect(signs, (before, middle), finest, Some(found), crossed);
             }
             continue;
         }
@@ -57,7 +100,7 @@ pub(crate) fn first_crossing(
             let found = crossed(signs, extremum)?;
             if found.is_some() {
                 let before = if turn < (part - 1) as f64 { time(part - 2) } else { time(part - 1) };
-                return bisect(signs, (before, extremum), finest, found, &mut crossed);
+                return bisect(signs, (before, extremum), finest, found, crossed);
             }
         }
     }

@@ -59,6 +59,12 @@ pub trait Events {
     /// A failure names time and element, as everywhere here.
     fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure>;
 
+    /// The angles, in rad, of the sines and cosines that the event indicators evaluated last read: where they go far between two
+    /// points, indicators may have been zero any number of times.
+    fn angles(&self, angles: &mut Vec<f64>) {
+        angles.clear();
+    }
+
     /// The integration stands at `t`: at its start, exactly at an announced time event, or just past a located zero
     /// crossing. Up to here the old mode was used. Moves the current interval if `t` has reached the time event, takes the
     /// signs of all event indicators from their values at `(t, point)`, and may change the point. That of an implicit system

@@ -18,6 +18,8 @@ const NOISE: f64 = 1e-12;
 pub(crate) struct Signs {
     pub(super) held: Vec<bool>,
     pub(super) values: Vec<f64>,
+    /// The angles that they read.
+    pub(super) angles: Vec<f64>,
     /// Values at points of a step, one place after the other.
     seen: Vec<f64>,
     /// The greatest finite magnitude of each value.
@@ -44,6 +46,7 @@ impl Signs {
         let coarse = vec![false; indicators];
         Signs {
             held: coarse.clone(),
+            angles: Vec::new(),
             seen,
             most,
             values,
@@ -162,6 +165,7 @@ impl Signs {
         }
         self.thorough = events.looks_between();
         events.event_indicators(t, point, &mut self.values)?;
+        events.angles(&mut self.angles);
         self.keep(START);
         self.last = None;
         self.held.iter_mut().zip(&self.values).for_each(|(held, value)| *held = *value > 0.0);
@@ -174,6 +178,7 @@ impl Signs {
             return Ok(None);
         }
         events.event_indicators(t, point, &mut self.values)?;
+        events.angles(&mut self.angles);
         let sizes = self.values.iter().map(|value| value.abs()).zip(&mut self.most);
         sizes.filter(|(size, most)| size.is_finite() && *size > **most).for_each(|(size, most)| *most = size);
         if let Some(indicator) = self.values.iter().position(|value| value.is_nan()) {

@@ -112,6 +112,12 @@ impl Events for SemiExplicit<'_> {
     fn indicator_name(&self, indicator: usize) -> String {
         self.system.indicator_name(indicator)
     }
+    fn longest_step(&self) -> f64 {
+        self.system.longest_step()
+    }
+    fn angles(&self, angles: &mut Vec<f64>) {
+        self.system.angles(angles);
+    }
     fn event_indicators(&mut self, t: f64, x: &[f64], g: &mut [f64]) -> Result<(), Failure> {
         self.complete(t, x)?;
         self.system.event_indicators(t, &self.point, g)

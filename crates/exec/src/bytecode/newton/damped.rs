@@ -31,6 +31,8 @@ pub(in crate::bytecode) const LEAST_CORRECTION: f64 = 4.0 * f64::EPSILON;
 pub(super) enum Globalization {
     /// To any root that damped steps find.
     Damped,
+    /// To any root that steps find which are damped as at the start.
+    Far,
     /// To a root that few, hardly damped steps find.
     Brief,
     /// To a root in whose region of local convergence it begins.
@@ -118,6 +120,7 @@ impl Frame {
     fn least_damping(&mut self, solve: &Solve, globalization: Globalization) -> f64 {
         match globalization {
             Globalization::Brief => MIN_DAMPING_BRIEF,
+            Globalization::Far => MIN_DAMPING_AT_START,
             _ if self.newton_of(solve).following => MIN_DAMPING,
             _ => MIN_DAMPING_AT_START,
         }
@@ -166,7 +169,8 @@ impl Frame {
 
     /// No damping factor passes: there is a nonsmooth point, or the residuals are rounding, or the iteration fails.
     fn reject_step(&mut self, solve: &Solve, norm: f64, globalization: Globalization) -> (StepOutcome, bool) {
-        if globalization == Globalization::Damped && self.crosses_nonsmooth_point(solve, norm) {
+        let any = matches!(globalization, Globalization::Damped | Globalization::Far);
+        if any && self.crosses_nonsmooth_point(solve, norm) {
             self.newton_of(solve).accept_trial();
             return (StepOutcome::Accepted, false);
         }

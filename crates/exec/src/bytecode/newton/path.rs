@@ -130,7 +130,9 @@ impl Frame {
     fn evaluate_on_path(&mut self, solve: &Solve, part: f64) -> bool {
         let newton = self.newton_of(solve);
         for i in 0..newton.x.len() {
-            newton.trial[i] = newton.start[i] + part * (newton.x[i] - newton.start[i]);
+            let way = part * (newton.x[i] - newton.start[i]);
+            // The root itself, and not what rounding makes of the way to it.
+            newton.trial[i] = if part == 1.0 { newton.x[i] } else { newton.start[i] + way };
         }
         self.evaluate(solve, true)
     }

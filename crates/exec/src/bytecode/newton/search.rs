@@ -83,10 +83,15 @@ impl Frame {
         newton.floating.now.fill(false);
         newton.floor.fill(0.0);
         newton.outer.iter_mut().zip(&solve.outer).for_each(|(value, &register)| *value = r[register as usize]);
-        if let Err(why) = self.continue_root(solve)
-            && (self.newton_of(solve).following || !self.search(solve))
-        {
-            return Err(self.solve_error(solve, why));
+        if let Err(why) = self.continue_root(solve) {
+            let found = match self.newton_of(solve).following {
+                false => self.search(solve),
+                true if matches!(why, NoContinuation::OffMotion) => false,
+                true => solve.right.len() == 1 && self.continue_by_scan(solve),
+            };
+            if !found {
+                return Err(self.solve_error(solve, why));
+            }
         }
         self.store_jacobian(solve);
         self.newton_of(solve).fresh = !has_conditions(solve);
@@ -152,9 +157,30 @@ impl Frame {
             Ok(()) => self.other_root(solve),
             Err(failed) => NoContinuation::NotConverged(failed),
         };
-        let found = self.continue_in_steps(solve) || self.continue_above_rounding(solve);
+        let found = self.continue_in_steps(solve) || self.continue_above_rounding(solve) || self.continue_far(solve);
         self.newton_of(solve).regular = false;
         if found { Ok(()) } else { Err(why) }
+    }
+
+    /// The same by corrections of which ever so little is taken: from where all laws are all but flat, as squares of flows near 0 are.
+    fn continue_far(&mut self, solve: &Solve) -> bool {
+        let newton = self.newton_of(solve);
+        if !newton.following || newton.positions {
+            return false;
+        }
+        newton.floating.now.fill(false);
+        newton.start_at_previous();
+        self.iterate(solve, Globalization::Far).is_ok() && self.is_unique_near_path(solve)
+    }
+
+    /// The same of one equation whose law is so steep on the way that no correction leads there: the root is bracketed, and counts if
+    /// nothing turns round between the previous solution and it.
+    fn continue_by_scan(&mut self, solve: &Solve) -> bool {
+        if !self.scan(solve) {
+            return false;
+        }
+        self.newton_of(solve).start_at_previous();
+        self.is_unique_near_path(solve)
     }
 
     /// The same where an unknown that is 0 but for the rounding of others hides it: corrections of such an unknown are never

@@ -22,6 +22,9 @@ const ITERATIONS: usize = 200;
 const ROUNDS: usize = 50;
 /// Up to so many states equations are full.
 const FEW_STATES: usize = 50;
+/// Times for which the motion is followed away from where laws are flat, as powers of ten in s, and in how many steps.
+const TIMES_AWAY: std::ops::RangeInclusive<i32> = -6..=6;
+const STEPS_AWAY: usize = 3;
 /// A rate that changes its state by less than this part of it, in the shortest time that the model knows, says nothing of a step.
 const UNSEEN: f64 = 1e-12;
 /// A constraint counts as kept if it is missed by less than this fraction of what its displacements come to.
@@ -159,7 +162,42 @@ impl Model {
         };
         let released = self.release_loads(within, t, x);
         let settled = released.and_then(|near| self.settle(&mut jacobian, within, t, &near).ok());
-        settled.and_then(|found| self.audited(leaf, t, found).ok()).ok_or(refused)
+        let found = settled.and_then(|found| self.audited(leaf, t, found).ok());
+        found.or_else(|| self.settle_away(&mut jacobian, within, t, x)).ok_or(refused)
+    }
+
+    /// From where laws are flat, or infinitely steep, a slope says nothing of what is further on: a pipe in which nothing flows, a
+    /// weir below its edge, tanks that are level. So searches begin where the motion leads from there, in times from short to long.
+    fn settle_away(
+        &mut self,
+        jacobian: &mut Jacobian,
+        within: (Option<&Leaf>, &[bool]),
+        t: f64,
+        x: &[f64],
+    ) -> Option<Equilibrium> {
+        let at = self.point(jacobian, within, t, x.to_vec()).ok()?;
+        if x.len() > FEW_STATES || !(self.code.program.steep || at.has_flat_state()) {
+            return None;
+        }
+        for decade in TIMES_AWAY {
+            let time = crate::math::pow(10.0, f64::from(decade));
+            let mut there = Some(x.to_vec());
+            for _ in 0..STEPS_AWAY {
+                there = there.and_then(|x| {
+                    self.rates_at(t, &x).ok()?;
+                    let step: Vec<f64> = self.dx.iter().map(|rate| time / STEPS_AWAY as f64 * rate).collect();
+                    self.moved(within.0, t, &x, &step)
+                });
+            }
+            let settled = there.and_then(|there| {
+                let inert = self.inert(jacobian, t, &there).ok()?;
+                self.settle(jacobian, (within.0, &inert), t, &there).ok()
+            });
+            if let Some(found) = settled.and_then(|found| self.audited(within.0, t, found).ok()) {
+                return Some(found);
+            }
+        }
+        None
     }
 
     /// What was found, if the constraints are kept there.

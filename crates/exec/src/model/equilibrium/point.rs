@@ -38,6 +38,17 @@ pub(super) struct NewtonStep {
 
 impl LinearisedPoint {
     /// The derivatives: row, column and value.
+    /// Whether there is a state that no rate changes with, or a rate that changes with no state, at this point.
+    pub fn has_flat_state(&self) -> bool {
+        let n = self.x.len();
+        let (mut rows, mut columns) = (vec![false; n], vec![false; n]);
+        for (row, column, value) in self.entries() {
+            rows[row] |= value != 0.0;
+            columns[column] |= value != 0.0;
+        }
+        rows.contains(&false) || columns.contains(&false)
+    }
+
     pub fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         self.jacobian.iter().copied()
     }

@@ -154,6 +154,14 @@ impl Events for ImplicitModel {
     }
 
     /// Those of the form, then, where there are bounds of branches, those of the minimal form.
+    fn longest_step(&self) -> f64 {
+        self.form.longest_step()
+    }
+
+    fn angles(&self, angles: &mut Vec<f64>) {
+        self.form.angles(angles);
+    }
+
     fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
         let entered = self.entered.clone();
         let (y, yp) = halves(entered.as_deref().unwrap_or(point));

@@ -348,6 +348,10 @@ impl Events for Varied<'_> {
         self.model.indicator_name(indicator)
     }
 
+    fn angles(&self, angles: &mut Vec<f64>) {
+        self.model.angles(angles);
+    }
+
     fn event_indicators(&mut self, t: f64, y: &[f64], g: &mut [f64]) -> Result<(), Failure> {
         self.model.event_indicators(t, &y[..self.n], g)
     }

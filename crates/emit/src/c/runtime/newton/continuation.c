@@ -409,6 +409,19 @@ static int ha_turns(const ha_newton *w, int is_short, $real passed, const $real 
 }
 
 //end
+//item ha_continue_far
+/* The same by corrections of which ever so little is taken: from where all laws are all but flat. */
+static int ha_continue_far(ha_model *m, ha_newton *w)
+{
+    if (!w->following || w->positions) {
+        return 0;
+    }
+    $ha_fill(w->offset, $0.0, w->n);
+    $ha_copy(w->start, w->previous, w->n);
+    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+    return $ha_iterate(m, w, HA_FAR) && $ha_is_unique_near_path(m, w);
+}
+
 //item ha_continue_root
 /* The root that continues the previous solution: 0, or why there is none. */
 static int ha_continue_root(ha_model *m, ha_newton *w, int number)
@@ -438,7 +451,7 @@ static int ha_continue_root(ha_model *m, ha_newton *w, int number)
     for (i = 0; i < w->n; ++i) {
         w->magnitude[i] = $ha_max($fabs(w->x[i]), $fabs(w->previous[i]));
     }
-    if ($ha_continue_in_steps(m, w) || $ha_continue_above_rounding(m, w)) {
+    if ($ha_continue_in_steps(m, w) || $ha_continue_above_rounding(m, w) || $ha_continue_far(m, w)) {
         w->regular = 0;
         return $MODEL_OK;
     }

@@ -14,7 +14,8 @@ static int ha_evaluate_on_path(ha_model *m, ha_newton *w, $real part)
     int i;
     for (i = 0; i < w->n; ++i) {
         const $real way = part * (w->x[i] - w->start[i]);
-        w->trial[i] = w->start[i] + way;
+        /* The root itself, and not what rounding makes of the way to it. */
+        w->trial[i] = part == $1.0 ? w->x[i] : w->start[i] + way;
     }
     return $ha_evaluate(m, w, w->trial);
 }

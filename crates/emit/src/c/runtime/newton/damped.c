@@ -1,4 +1,4 @@
-enum { HA_DAMPED, HA_BRIEF, HA_LOCAL };
+enum { HA_DAMPED, HA_FAR, HA_BRIEF, HA_LOCAL };
 enum { HA_CONVERGED, HA_ACCEPTED, HA_REJECTED };
 
 //item ha_jacobian_change
@@ -68,7 +68,7 @@ static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w, $real norm)
  * step does. */
 static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalization, int *contracts)
 {
-    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (w->following ? $1e-6 : $LEAST_DAMPING);
+    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (w->following && globalization != HA_FAR ? $1e-6 : $LEAST_DAMPING);
     $real damping = $1.0;
     int halving;
     int i;
@@ -101,7 +101,7 @@ static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalizati
             break;
         }
     }
-    if (globalization == HA_DAMPED && $ha_crosses_nonsmooth_point(m, w, norm)) {
+    if ((globalization == HA_DAMPED || globalization == HA_FAR) && $ha_crosses_nonsmooth_point(m, w, norm)) {
         $ha_accept_trial(w);
         *contracts = 0;
         return HA_ACCEPTED;

@@ -322,16 +322,16 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
     $ha_copy(w.present, o, w.block->reads);
     $ha_fill(w.floor, $0.0, w.n);
     status = $ha_continue_root(m, &w, number);
-    if (status != $MODEL_OK && w.following) {
 //if newton_single
-        /* Is there a solution elsewhere, or none at all? */
-        if (status == $MODEL_NO_CONVERGENCE && w.n == 1 && $ha_scan(m, &w)) {
-            status = $MODEL_BRANCH;
-        }
-//end
-        return status;
+    /* One equation, so steep on the way that no correction leads to its root: is it the only one there? */
+    if ((status == $MODEL_NO_CONVERGENCE || status == $MODEL_BRANCH) && w.following && w.n == 1 && $ha_scan(m, &w)) {
+        $ha_fill(w.offset, $0.0, w.n);
+        $ha_copy(w.start, w.previous, w.n);
+        $ha_copy(w.start_jacobian, w.previous_jacobian, w.entries);
+        status = $ha_is_unique_near_path(m, &w) ? $MODEL_OK : $MODEL_BRANCH;
     }
-    if (status != $MODEL_OK && !$ha_search(m, &w)) {
+//end
+    if (status != $MODEL_OK && (w.following || !$ha_search(m, &w))) {
         return status;
     }
     $ha_copy(w.jacobian, w.matrix, w.entries);
