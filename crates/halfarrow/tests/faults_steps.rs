@@ -1,4 +1,5 @@
 //! Steps: how many there are, what asks for them, and what is said before they are taken.
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use std::path::{Path, PathBuf};
 
@@ -701,4 +702,23 @@ fn a_valve_in_an_iteration_closes() {
     let halves =
         text("model Halves\nSe:s(1 + sin(t)) -> 1:x -> R:o(f = sqrt(max(e, 0)) - sqrt(max(-e, 0)))\nx -> R:r(1)\n");
     run(&halves, Run { to: 6.0, ..Run::default() });
+}
+
+/// Edges of pulses that a `when` moves are met by steps of fixed length, wherever they lie. The reference is the sum of exponentials.
+#[test]
+fn edges_that_events_move_are_met() {
+    let model = text(
+        "model Pwm\ndiscrete t0 = 0\nwhen every 0.1 ms { t0 = t }\n\
+         Se:v(if t - t0 < 4.3e-5 then 12 else 0) -> 1:l -> I:l1(1 mH)\nl -> R:load(5)\n",
+    );
+    let (period, on, rate, full) = (1e-4_f64, 4.3e-5_f64, 5e3_f64, 12.0_f64 / 5.0);
+    let pulse = |i: f64| (full + (i - full) * (-rate * on).exp()) * (-rate * (period - on)).exp();
+    let wanted = (0..10).fold(0.0, |i, _| pulse(i));
+    for step in [5e-6, 2e-6, 1e-6] {
+        let record = Record::Names(vec!["l1.f".into()]);
+        let method = Method::Fixed(FixedMethod::Rk4);
+        let done = run(&model, Run { to: 1e-3, method, step: Some(step), record, ..Run::default() });
+        let off = (end_of(&done, "l1.f") - wanted).abs();
+        assert!(off <= 1e-8, "steps of {step} s: {off:e} off {wanted}");
+    }
 }

@@ -3,7 +3,7 @@
 use super::op::Op;
 use super::triggers::linear_in_time;
 use super::values::Reads;
-use super::{Program, Value};
+use super::{Condition, EventTrigger, Program, Value};
 use crate::algebra::Function;
 use crate::ids::Id;
 
@@ -22,6 +22,29 @@ impl Program {
         angles.sort_unstable();
         angles.dedup();
         angles
+    }
+
+    /// Whether there are edges in time that an event moves: conditions on time and discrete variables alone, as those of a pulse
+    /// whose width is set by a `when`. They are known as exactly as time is, so that methods of fixed step meet them too.
+    pub fn has_moved_edges(&self) -> bool {
+        let moved = |condition: &Condition| {
+            if condition.trigger != EventTrigger::State {
+                return false;
+            }
+            let (mut by_time, mut by_event) = (false, false);
+            for op in self.dataflow().varying(&[condition.operand]) {
+                match op {
+                    Op::Time => by_time = true,
+                    Op::Held(held) if self.held[held as usize].kind.is_discrete() => by_event = true,
+                    Op::Held(_) | Op::State(_) | Op::Rate(_) | Op::Input(_) | Op::Conserved(_) | Op::Solution(..) => {
+                        return false;
+                    }
+                    _ => {}
+                }
+            }
+            by_time && by_event
+        };
+        self.conditions.values().any(moved)
     }
 
     /// Those of them that time alone turns, in proportion to it: of sources that swing.

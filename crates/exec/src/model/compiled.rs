@@ -231,6 +231,8 @@ pub(super) struct Mode {
     /// Computes these operands, and behind them the angles that they read.
     pub indicators: Routine,
     pub clock: Clock,
+    /// Whether events move edges in time.
+    pub moved_edges: bool,
     /// Computes what is delayed or sampled.
     pub sources: Routine,
     /// States that jump with a source, if there are any.
@@ -294,6 +296,7 @@ impl Mode {
             solutions,
             switching: of_state().map(|(id, _)| id).collect(),
             indicators: layout.routine(&program, &[&operands[..], &angles].concat()),
+            moved_edges: program.has_moved_edges(),
             clock: Clock::new(&program, &layout, &seen),
             sources: layout.routine(&program, &sources),
             kept: ConservedSums::of(&program, &layout),

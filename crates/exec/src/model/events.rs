@@ -352,7 +352,7 @@ impl Events for Model {
     }
 
     fn locates_crossings(&self) -> bool {
-        !self.code.clauses.conditional.is_empty()
+        !self.code.clauses.conditional.is_empty() || self.code.moved_edges
     }
 
     fn accept(&mut self, t: f64, x: &[f64]) -> Result<(), Failure> {

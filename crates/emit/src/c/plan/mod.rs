@@ -369,7 +369,8 @@ impl<'a> Plan<'a> {
 
     /// Whether crossings are located within steps, since something happens there.
     pub fn locates(&self) -> bool {
-        !(self.events.conditional.is_empty() || self.switches.is_empty())
+        let happens = !self.events.conditional.is_empty() || self.program.has_moved_edges();
+        happens && !self.switches.is_empty()
     }
 
     /// Whether a start may differ from the exported one.
