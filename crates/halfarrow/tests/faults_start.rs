@@ -739,6 +739,7 @@ fn rest_is_found_from_where_laws_are_flat() {
     let models = [
         ("Se:res(50) -> 1:p -> I:q(20)\np -> R:fr(e = 3*f*abs(f))", "q.f", (50.0_f64 / 3.0).sqrt()),
         ("Se:s(5) -> 1:w -> I:m(2)\nw -> C:k(e = 4*q^3)\nw -> R:d(1)", "k.q", 1.25_f64.cbrt()),
+        ("Sf:s(0.3) -> 0:a -> C:c1(1)\na -> R:w(f = 1.5*max(e - 0.8, 0)^1.5)", "c1.e", 0.8 + 0.2_f64.powf(2.0 / 3.0)),
         ("Sf:s(100) -> 0:a -> C:c1(100)\na -> R:w(f = 2*sign(e)*abs(e)^1.25)", "c1.e", 50.0_f64.powf(0.8)),
         (
             "Sf:s(0.3) -> 0:a -> C:c1(1)\na -> 1:x -> 0:b -> C:c2(2)\nx -> R:o(f = 0.2*sign(e)*sqrt(abs(e)))\nb -> R:o2(1)",

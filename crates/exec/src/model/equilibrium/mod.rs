@@ -22,7 +22,7 @@ const ITERATIONS: usize = 200;
 const ROUNDS: usize = 50;
 /// Up to so many states equations are full.
 const FEW_STATES: usize = 50;
-/// Times for which the motion is followed away from where laws are flat, as powers of ten in s, and in how many steps.
+/// Steps by which the motion is followed away from where laws are flat, as powers of ten in s, and how many of each.
 const TIMES_AWAY: std::ops::RangeInclusive<i32> = -6..=6;
 const STEPS_AWAY: usize = 3;
 /// A rate that changes its state by less than this part of it, in the shortest time that the model knows, says nothing of a step.
@@ -181,20 +181,17 @@ impl Model {
         }
         for decade in TIMES_AWAY {
             let time = crate::math::pow(10.0, f64::from(decade));
-            let mut there = Some(x.to_vec());
+            let mut there = x.to_vec();
             for _ in 0..STEPS_AWAY {
-                there = there.and_then(|x| {
-                    self.rates_at(t, &x).ok()?;
-                    let step: Vec<f64> = self.dx.iter().map(|rate| time / STEPS_AWAY as f64 * rate).collect();
-                    self.moved(within.0, t, &x, &step)
-                });
-            }
-            let settled = there.and_then(|there| {
-                let inert = self.inert(jacobian, t, &there).ok()?;
-                self.settle(jacobian, (within.0, &inert), t, &there).ok()
-            });
-            if let Some(found) = settled.and_then(|found| self.audited(within.0, t, found).ok()) {
-                return Some(found);
+                self.rates_at(t, &there).ok()?;
+                let step: Vec<f64> = self.dx.iter().map(|rate| time * rate).collect();
+                let Some(next) = self.moved(within.0, t, &there, &step) else { break };
+                there = next;
+                let Ok(inert) = self.inert(jacobian, t, &there) else { break };
+                let settled = self.settle(jacobian, (within.0, &inert), t, &there).ok();
+                if let Some(found) = settled.and_then(|found| self.audited(within.0, t, found).ok()) {
+                    return Some(found);
+                }
             }
         }
         None
