@@ -136,8 +136,13 @@ impl Model {
         }
         let leaf = begun.leaf(t, &y);
         let mut jacobian = Jacobian::new(begun.sparsity());
-        let Ok(inert) = begun.inert(&mut jacobian, t, &y) else { return false };
-        let Ok(at) = begun.point(&mut jacobian, (leaf.as_ref(), inert.as_slice()), t, y) else { return false };
+        begun.rests_at(&mut jacobian, leaf.as_ref(), t, &y)
+    }
+
+    /// Whether rates are as good as zero at `x`, beside what they add up there and nowhere else.
+    fn rests_at(&mut self, jacobian: &mut Jacobian, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
+        let Ok(inert) = self.inert(jacobian, t, x) else { return false };
+        let Ok(at) = self.point(jacobian, (leaf, &inert), t, x.to_vec()) else { return false };
         let mut rest = Rest::new(at.x.len());
         rest.see(&at);
         rest.is_reached(&at)
@@ -189,7 +194,8 @@ impl Model {
                 there = next;
                 let Ok(inert) = self.inert(jacobian, t, &there) else { break };
                 let settled = self.settle(jacobian, (within.0, &inert), t, &there).ok();
-                if let Some(found) = settled.and_then(|found| self.audited(within.0, t, found).ok()) {
+                let found = settled.and_then(|found| self.audited(within.0, t, found).ok());
+                if let Some(found) = found.filter(|found| self.rests_at(jacobian, within.0, t, &found.x)) {
                     return Some(found);
                 }
             }
