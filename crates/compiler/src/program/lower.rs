@@ -111,7 +111,7 @@ impl<'a> Lowering<'a> {
     /// Lowers an expression whose parts are lowered.
     fn node_of(&mut self, e: Expr) -> Value {
         self.passing = self.passes_freely(e);
-        self.iterated |= self.inner.is_some() && (self.free.steep.contains(&e) || self.free.smooth.contains(&e));
+        self.iterated |= self.inner.is_some() && self.free.contains(e);
         let value = self.node(e);
         match &mut self.inner {
             Some(inner) => {
@@ -378,7 +378,7 @@ impl<'a> Lowering<'a> {
     fn passes_freely(&self, e: Expr) -> bool {
         let moves = |part| self.known(part).is_some_and(|part| self.values.reads(part).includes(Reads::STATE));
         let mut moved = false;
-        if self.free.steep.contains(&e) || self.free.smooth.contains(&e) {
+        if self.free.contains(e) {
             self.exprs.node(e).for_each_child(|part| moved |= moves(part));
         }
         moved

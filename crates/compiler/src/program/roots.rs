@@ -17,9 +17,15 @@ pub(super) struct FreeSides {
     pub smooth: FxHashSet<Expr>,
 }
 
+impl FreeSides {
+    pub fn contains(&self, e: Expr) -> bool {
+        self.steep.contains(&e) || self.smooth.contains(&e)
+    }
+}
+
 /// The sides that are passed without an event. Where one side of a law is 0, as that of `max(a, 0)`, nothing but an event tells
-/// what comes on the other. `exprs` is all that is evaluated, parts and wholes, `wholes` what is read by name; `varies` tells what more than
-/// parameters determine.
+/// what comes on the other. `exprs` is all that is evaluated, parts and wholes, `wholes` what is read by name;
+/// `varies` tells what more than parameters determine.
 pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dyn Fn(Expr) -> bool) -> FreeSides {
     let roots = Roots { x, varies };
     let sides: FxHashSet<Expr> = exprs.iter().copied().filter(|&e| roots.is_side(e)).collect();
@@ -29,7 +35,11 @@ pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dy
     let wholes: FxHashSet<Expr> = wholes.iter().copied().collect();
     let mut readers: FxHashMap<Expr, Vec<Expr>> = FxHashMap::default();
     for &e in exprs {
-        x.node(e).for_each_child(|part| readers.entry(part).or_default().push(e));
+        x.node(e).for_each_child(|part| {
+            if sides.contains(&part) || matches!(x.node(part), Node::Mul(_)) {
+                readers.entry(part).or_default().push(e);
+            }
+        });
     }
     let readers_of = |e: Expr| readers.get(&e).map_or(&[][..], Vec::as_slice);
     // What is read by name may be read by anybody.

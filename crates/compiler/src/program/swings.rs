@@ -1,4 +1,4 @@
-//! What turns round and round: arguments of sines and cosines.
+//! What turns round and round, arguments of sines and cosines, and edges in time that events move.
 
 use super::op::Op;
 use super::triggers::linear_in_time;
@@ -24,6 +24,16 @@ impl Program {
         angles
     }
 
+    /// Those of them that time alone turns, in proportion to it: of sources that swing.
+    pub fn turned_by_time(&self, wanted: &[Value]) -> Vec<Value> {
+        let mut angles = self.angles(wanted);
+        if !angles.is_empty() {
+            let linear = linear_in_time(self.dataflow(), &self.tables);
+            angles.retain(|angle| linear[angle.index()]);
+        }
+        angles
+    }
+
     /// Whether there are edges in time that an event moves: conditions on time and discrete variables alone, as those of a pulse
     /// whose width is set by a `when`. They are known as exactly as time is, so that methods of fixed step meet them too.
     pub fn has_moved_edges(&self) -> bool {
@@ -45,15 +55,5 @@ impl Program {
             by_time && by_event
         };
         self.conditions.values().any(moved)
-    }
-
-    /// Those of them that time alone turns, in proportion to it: of sources that swing.
-    pub fn turned_by_time(&self, wanted: &[Value]) -> Vec<Value> {
-        let mut angles = self.angles(wanted);
-        if !angles.is_empty() {
-            let linear = linear_in_time(self.dataflow(), &self.tables);
-            angles.retain(|angle| linear[angle.index()]);
-        }
-        angles
     }
 }

@@ -261,9 +261,7 @@ impl Model {
         }
         false
     }
-}
 
-impl Model {
     /// Takes conditions on time as they are just after `t`, and looks when the first of them changes.
     pub(super) fn handle_time_event(&mut self, t: f64) {
         self.code.clock.handle_time_event(&mut self.frame, t, &mut self.run.clock_event);

@@ -41,6 +41,9 @@ pub(crate) fn first_crossing(
     let pieces = pieces(signs, (start, end), &mut crossed)?;
     let time = |piece: usize| if piece == pieces { end } else { start + (end - start) * piece as f64 / pieces as f64 };
     for piece in 0..pieces {
+        if piece > 0 {
+            crossed(signs, time(piece))?;
+        }
         if let Some(found) = first_in_piece(signs, time(piece), time(piece + 1), &mut crossed)? {
             return Ok(Some(found));
         }
@@ -48,27 +51,27 @@ pub(crate) fn first_crossing(
     Ok(None)
 }
 
-/// How many pieces of a step show all that indicators do that read sines of angles.
+/// How many pieces of a step show all that indicators do that read sines of angles. Ends with an evaluation at the start.
 fn pieces(
     signs: &mut Signs,
     (start, end): (f64, f64),
     crossed: &mut impl FnMut(&mut Signs, f64) -> Result<Option<usize>, Failure>,
 ) -> Result<usize, Failure> {
-    if signs.angles.is_empty() {
-        return Ok(1);
-    }
     signs.sharpen(None);
-    crossed(signs, start)?;
-    let before = signs.angles.clone();
-    // Beyond a crossing there need be no values.
-    if crossed(signs, end).is_err() {
+    if signs.angles.is_empty() {
+        crossed(signs, start)?;
         return Ok(1);
     }
-    let turned = before.iter().zip(&signs.angles).map(|(before, after)| (after - before).abs()).fold(0.0, f64::max);
+    // Beyond a crossing there need be no values.
+    let has_end = crossed(signs, end).is_ok();
+    std::mem::swap(&mut signs.angles, &mut signs.angles_at_end);
+    crossed(signs, start)?;
+    let ways = signs.angles.iter().zip(&signs.angles_at_end).map(|(start, end)| (end - start).abs());
+    let turned = if has_end { ways.fold(0.0, f64::max) } else { 0.0 };
     Ok((turned / TURN).ceil().clamp(1.0, MOST_PIECES) as usize)
 }
 
-/// The same in a piece of a step.
+/// The same in a piece of a step, at whose start the indicators were evaluated last.
 fn first_in_piece(
     signs: &mut Signs,
     start: f64,
@@ -78,8 +81,6 @@ fn first_in_piece(
     let time = |part: usize| if part == PARTS { end } else { start + (end - start) * part as f64 / PARTS as f64 };
     let finest = FINEST * (end - start);
     let (thorough, mut looks) = (signs.thorough, 0);
-    signs.sharpen(None);
-    crossed(signs, start)?;
     signs.keep(0);
     for part in 1..=PARTS {
         let found = crossed(signs, time(part))?;

@@ -18,8 +18,9 @@ const NOISE: f64 = 1e-12;
 pub(crate) struct Signs {
     pub(super) held: Vec<bool>,
     pub(super) values: Vec<f64>,
-    /// The angles that they read.
+    /// The angles that they read, and those at the end of a step that is searched.
     pub(super) angles: Vec<f64>,
+    pub(super) angles_at_end: Vec<f64>,
     /// Values at points of a step, one place after the other.
     seen: Vec<f64>,
     /// The greatest finite magnitude of each value.
@@ -47,6 +48,7 @@ impl Signs {
         Signs {
             held: coarse.clone(),
             angles: Vec::new(),
+            angles_at_end: Vec::new(),
             seen,
             most,
             values,

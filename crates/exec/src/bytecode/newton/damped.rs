@@ -131,7 +131,8 @@ impl Frame {
     }
 
     /// Takes the correction with the greatest damping factor `1, 1/2, 1/4 ...` that passes the restricted natural
-    /// monotonicity test: the simplified correction behind it is [`shortened`]. Also whether the undamped step contracts. `norm`: of the correction.
+    /// monotonicity test: the simplified correction behind it is [`shortened`]. Also whether the undamped step contracts.
+    /// `norm`: of the correction.
     fn damped_step(&mut self, solve: &Solve, norm: f64, globalization: Globalization) -> (StepOutcome, bool) {
         let least_damping = self.least_damping(solve, globalization);
         let mut damping = 1.0;
@@ -169,8 +170,8 @@ impl Frame {
 
     /// No damping factor passes: there is a nonsmooth point, or the residuals are rounding, or the iteration fails.
     fn reject_step(&mut self, solve: &Solve, norm: f64, globalization: Globalization) -> (StepOutcome, bool) {
-        let any = matches!(globalization, Globalization::Damped | Globalization::Far);
-        if any && self.crosses_nonsmooth_point(solve, norm) {
+        let to_any_root = matches!(globalization, Globalization::Damped | Globalization::Far);
+        if to_any_root && self.crosses_nonsmooth_point(solve, norm) {
             self.newton_of(solve).accept_trial();
             return (StepOutcome::Accepted, false);
         }

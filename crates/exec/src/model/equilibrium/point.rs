@@ -37,7 +37,6 @@ pub(super) struct NewtonStep {
 }
 
 impl LinearisedPoint {
-    /// The derivatives: row, column and value.
     /// Whether there is a state that no rate changes with, or a rate that changes with no state, at this point.
     pub fn has_flat_state(&self) -> bool {
         let n = self.x.len();
@@ -49,6 +48,7 @@ impl LinearisedPoint {
         rows.contains(&false) || columns.contains(&false)
     }
 
+    /// The derivatives: row, column and value.
     pub fn entries(&self) -> impl Iterator<Item = Entry> + '_ {
         self.jacobian.iter().copied()
     }

@@ -153,7 +153,6 @@ impl Events for ImplicitModel {
         }
     }
 
-    /// Those of the form, then, where there are bounds of branches, those of the minimal form.
     fn longest_step(&self) -> f64 {
         self.form.longest_step()
     }
@@ -162,6 +161,7 @@ impl Events for ImplicitModel {
         self.form.angles(angles);
     }
 
+    /// Those of the form, then, where there are bounds of branches, those of the minimal form.
     fn event_indicators(&mut self, t: f64, point: &[f64], g: &mut [f64]) -> Result<(), Failure> {
         let entered = self.entered.clone();
         let (y, yp) = halves(entered.as_deref().unwrap_or(point));

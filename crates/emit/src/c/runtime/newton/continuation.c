@@ -161,9 +161,7 @@ static int ha_continue_in_steps(ha_model *m, ha_newton *w)
 {
     $real s = $0.0;
     $real path_step = $0.25;
-    $ha_fill(w->offset, $0.0, w->n);
-    $ha_copy(w->start, w->previous, w->n);
-    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+    $ha_start_at_previous(w);
     $ha_copy(w->x, w->previous, w->n);
     if (!w->following && !$ha_evaluate(m, w, w->x)) {
         return 0;
@@ -288,9 +286,7 @@ static int ha_continue_above_rounding(ha_model *m, ha_newton *w)
     if (!w->following || !$ha_find_floors(m, w)) {
         return 0;
     }
-    $ha_fill(w->offset, $0.0, w->n);
-    $ha_copy(w->start, w->previous, w->n);
-    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+    $ha_start_at_previous(w);
     if (($ha_iterate(m, w, HA_DAMPED) && ($ha_is_continuation(w) || $ha_is_unique_near_path(m, w)))
         || $ha_continue_in_steps(m, w)) {
         return 1;
@@ -416,9 +412,7 @@ static int ha_continue_far(ha_model *m, ha_newton *w)
     if (!w->following || w->positions) {
         return 0;
     }
-    $ha_fill(w->offset, $0.0, w->n);
-    $ha_copy(w->start, w->previous, w->n);
-    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+    $ha_start_at_previous(w);
     return $ha_iterate(m, w, HA_FAR) && $ha_is_unique_near_path(m, w);
 }
 
@@ -436,9 +430,7 @@ static int ha_continue_root(ha_model *m, ha_newton *w, int number)
 //else
     (void)number;
 //end
-    $ha_fill(w->offset, $0.0, w->n);
-    $ha_copy(w->start, w->previous, w->n);
-    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+    $ha_start_at_previous(w);
     if ($ha_iterate(m, w, HA_DAMPED)) {
         if ($ha_is_continuation(w) || (w->following && $ha_is_unique_near_path(m, w))) {
             return $MODEL_OK;

@@ -7,6 +7,15 @@ static int ha_evaluate(ha_model *m, ha_newton *w, const $real *point)
     return $ha_all_finite(w->right, w->n) && $ha_all_finite(w->matrix, w->entries);
 }
 
+//item ha_start_at_previous
+/* The next iteration starts at the previous solution. */
+static void ha_start_at_previous(ha_newton *w)
+{
+    $ha_fill(w->offset, $0.0, w->n);
+    $ha_copy(w->start, w->previous, w->n);
+    $ha_copy(w->start_jacobian, w->previous_jacobian, w->entries);
+}
+
 //item ha_evaluate_on_path
 /* Evaluates a point on the line from the start (0) to the root (1). */
 static int ha_evaluate_on_path(ha_model *m, ha_newton *w, $real part)

@@ -68,7 +68,8 @@ static int ha_crosses_nonsmooth_point(ha_model *m, ha_newton *w, $real norm)
  * step does. */
 static int ha_damped_step(ha_model *m, ha_newton *w, $real norm, int globalization, int *contracts)
 {
-    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (w->following && globalization != HA_FAR ? $1e-6 : $LEAST_DAMPING);
+    const int is_bounded = w->following && globalization != HA_FAR;
+    const $real least_damping = globalization == HA_BRIEF ? $0.1 : (is_bounded ? $1e-6 : $LEAST_DAMPING);
     $real damping = $1.0;
     int halving;
     int i;

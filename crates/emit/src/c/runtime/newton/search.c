@@ -325,9 +325,7 @@ static int ha_find_root(ha_model *m, int number, const $real *o, $real *x)
 //if newton_single
     /* One equation, so steep on the way that no correction leads to its root: is it the only one there? */
     if ((status == $MODEL_NO_CONVERGENCE || status == $MODEL_BRANCH) && w.following && w.n == 1 && $ha_scan(m, &w)) {
-        $ha_fill(w.offset, $0.0, w.n);
-        $ha_copy(w.start, w.previous, w.n);
-        $ha_copy(w.start_jacobian, w.previous_jacobian, w.entries);
+        $ha_start_at_previous(&w);
         status = $ha_is_unique_near_path(m, &w) ? $MODEL_OK : $MODEL_BRANCH;
     }
 //end
