@@ -683,6 +683,21 @@ fn tanks_level_out_through_resistances_in_a_row_and_in_a_star() {
     }
 }
 
+/// Both forms of a square with a sign are smooth, and no event; what jumps under a root is one.
+#[test]
+fn squares_are_no_events_and_jumps_under_roots_are() {
+    let switches = |law: &str| {
+        let model = text(&format!("model Law\n1:v -> I:m(1, f0 = 1)\nv -> C:k(1)\nv -> R:r({law})\n"));
+        run(&model, Run { to: 10.0, ..Run::default() }).report.switches
+    };
+    for square in ["e = 0.1*f*abs(f)", "e = 0.1*sign(f)*f^2", "e = 0.2*f*abs(f)/2 + 0.01*f"] {
+        assert_eq!(switches(square), 0, "{square}");
+    }
+    for jump in ["e = 0.1*f*sqrt(if f > 0 then 1 else 0)", "e = 0.1*sqrt(1 + sign(f))", "e = 0.1*max(f, 0)"] {
+        assert!(switches(jump) >= 3, "{jump}: {}", switches(jump));
+    }
+}
+
 /// A root that is 0 on one side, in an iteration: its slope has no end where the valve closes. The reference is the same by SciPy.
 #[test]
 fn a_valve_in_an_iteration_closes() {

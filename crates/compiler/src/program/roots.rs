@@ -13,7 +13,7 @@ pub(super) struct FreeSides {
     /// Those that nothing reads but roots which are continuous where these change their side: `abs(a)` under a root, `sign(a)`
     /// beside one of `abs(a)`, `a > 0` where it chooses between roots of `a` and `-a`.
     pub steep: FxHashSet<Expr>,
-    /// Those that squares with a sign read, `a abs(a)`, which are smooth.
+    /// Those that squares with a sign read, `a abs(a)` and `sign(a) a^2`, which are smooth.
     pub smooth: FxHashSet<Expr>,
 }
 
@@ -58,10 +58,16 @@ pub(super) fn free_sides(x: &Exprs, exprs: &[Expr], wholes: &[Expr], varies: &dy
             Node::Compare(..) => all_read(e, &|reader| roots.chooses_between_roots(reader, e)),
             _ => all_read(e, &leads_to_roots(e)),
         };
-        let smooth = || all_read(e, &|reader| leads_to_roots(e)(reader) || roots.is_square(reader, e));
+        let smooth = match x.node(e) {
+            Node::Call(Function::Sign, _) => {
+                all_read(e, &|reader| roots.has_root_beside(reader, e) || roots.is_square(reader, e))
+            }
+            Node::Compare(..) => false,
+            _ => all_read(e, &|reader| leads_to_roots(e)(reader) || roots.is_square(reader, e)),
+        };
         if steep {
             free.steep.insert(e);
-        } else if smooth() {
+        } else if smooth {
             free.smooth.insert(e);
         }
     }
@@ -134,11 +140,19 @@ impl Roots<'_> {
         matches!(self.x.node(product), Node::Mul(_)) && self.has_root(product, &self.core(a[0]))
     }
 
-    /// Whether a product has both `abs(a)` and `a` for factors: a square with a sign, which is smooth.
-    fn is_square(&self, product: Expr, magnitude: Expr) -> bool {
-        let Node::Call(Function::Abs, a) = self.x.node(magnitude) else { return false };
-        let (core, factors) = (self.core(a[0]), self.factors(product));
-        matches!(self.x.node(product), Node::Mul(_)) && core.iter().all(|part| factors.contains(part))
+    /// Whether a product has `abs(a)` and `a` for factors, or `sign(a)` and a square of `a`: a square with a sign, which is smooth.
+    fn is_square(&self, product: Expr, side: Expr) -> bool {
+        let Node::Call(f @ (Function::Abs | Function::Sign), a) = self.x.node(side) else { return false };
+        let least = if *f == Function::Abs { 1 } else { 2 };
+        let order = |factor: Expr| match self.x.node(factor) {
+            Node::Pow(base, n) => (*base, self.x.is_number(*n).and_then(|n| n.as_integer()).unwrap_or(0)),
+            _ => (factor, 1),
+        };
+        let factors = self.factors(product);
+        let has = |part: &Expr| {
+            factors.iter().any(|&factor| matches!(order(factor), (base, n) if base == *part && n >= least))
+        };
+        matches!(self.x.node(product), Node::Mul(_)) && self.core(a[0]).iter().all(has)
     }
 
     fn chooses_between_roots(&self, choice: Expr, comparison: Expr) -> bool {
