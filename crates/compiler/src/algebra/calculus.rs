@@ -71,7 +71,7 @@ impl Exprs {
 
     /// Whether an expression has wholes in it.
     pub fn has_wholes(&self, e: Expr) -> bool {
-        self.around_wholes(&[e]).iter().any(|&part| matches!(self.node(part), Node::Whole(_)))
+        self.around_wholes(&[e], &|_| true).iter().any(|&part| matches!(self.node(part), Node::Whole(_)))
     }
 
     /// The expression with expressions in place of symbols, all at once.

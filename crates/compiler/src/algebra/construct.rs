@@ -121,36 +121,40 @@ impl Exprs {
                 self.collect_term(sum, part, Some(&number));
             }
         } else {
-            sum.terms.push((number, monomial));
+            let as_it_stands = scale.is_none_or(Rational::is_one).then_some(term);
+            sum.terms.push(Term { number, monomial, as_it_stands });
         }
     }
 
     fn finish_sum(&mut self, sum: Sum) -> Expr {
         let Sum { constant, mut terms } = sum;
         if terms.len() > 1 {
-            terms.sort_by(|a, b| self.order(a.1, b.1));
+            terms.sort_by(|a, b| self.order(a.monomial, b.monomial));
             terms.dedup_by(|later, kept| {
-                let like = later.1 == kept.1;
+                let like = later.monomial == kept.monomial;
                 if like {
-                    kept.0 = &kept.0 + &later.0;
+                    kept.number = &kept.number + &later.number;
+                    kept.as_it_stands = None;
                 }
                 like
             });
         }
-        terms.retain(|(number, monomial)| !number.is_zero() || !self.total(*monomial));
+        terms.retain(|term| !term.number.is_zero() || !self.total(term.monomial));
         if terms.is_empty() {
             return self.number(constant);
         }
-        if let ([(number, monomial)], true) = (&terms[..], constant.is_zero()) {
-            return self.scale(number, *monomial);
+        let whole = |x: &mut Exprs, term: &Term| {
+            let made = |x: &mut Exprs| x.scale(&term.number, term.monomial);
+            term.as_it_stands.unwrap_or_else(|| made(x))
+        };
+        if let ([single], true) = (&terms[..], constant.is_zero()) {
+            return whole(self, single);
         }
         let mut children = Parts::with_capacity(terms.len() + 1);
         if !constant.is_zero() {
             children.push(self.number(constant));
         }
-        for (number, monomial) in terms {
-            children.push(self.scale(&number, monomial));
-        }
+        children.extend(terms.iter().map(|term| whole(self, term)));
         self.intern(Node::Add(children))
     }
 
@@ -465,7 +469,15 @@ impl Exprs {
 
 struct Sum {
     constant: Rational,
-    terms: SmallVec<[(Rational, Expr); 4]>,
+    terms: SmallVec<[Term; 4]>,
+}
+
+/// A term of a sum: a number times a product.
+struct Term {
+    number: Rational,
+    monomial: Expr,
+    /// The same as one expression, where there is one.
+    as_it_stands: Option<Expr>,
 }
 
 struct Product {

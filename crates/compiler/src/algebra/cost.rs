@@ -35,7 +35,7 @@ impl Exprs {
     pub fn is_longer(&self, e: Expr, length: u64) -> bool {
         let is_long = |part: Expr| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER);
         let may_be = LONGEST * u64::from(self.entry(e).size) > length;
-        may_be && self.written_length(e) > length || self.around_wholes(&[e]).into_iter().any(is_long)
+        may_be && self.written_length(e) > length || self.around_wholes(&[e], &|_| true).into_iter().any(is_long)
     }
 
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1

@@ -61,6 +61,8 @@ pub(super) struct PoolEntry {
     pub depth: u32,
     /// Entries below it, shared ones each time; at most `u32::MAX`.
     pub size: u32,
+    /// How long it is written; at most `u32::MAX`.
+    pub length: u32,
     pub properties: Properties,
     pub symbols: SetId,
     /// The product without its number; itself if it has none.
@@ -203,6 +205,7 @@ impl Exprs {
             hash,
             depth: self.depth_of(&node),
             size: self.size_of(&node),
+            length: self.length_of_node(&node),
             properties: self.properties_of(&node),
             symbols: self.symbols_of_node(&node),
             monomial: monomial.unwrap_or(Expr(self.entries.len() as u32)),

@@ -1,7 +1,7 @@
 //! An order of expressions that depends on names and structure only, never on when they were built.
 
 use super::exprs::Exprs;
-use super::node::{Expr, Node};
+use super::node::{Expr, Node, Parts};
 use std::cmp::Ordering;
 
 /// Below this depth expressions are compared part by part, beyond it by their hash.
@@ -51,7 +51,7 @@ impl Exprs {
     }
 
     fn order_children(&self, a: &Node, b: &Node) -> Ordering {
-        let (mut left, mut right) = (Vec::new(), Vec::new());
+        let (mut left, mut right) = (Parts::new(), Parts::new());
         a.for_each_child(|c| left.push(c));
         b.for_each_child(|c| right.push(c));
         let first = left.iter().zip(&right).map(|(&p, &q)| self.order(p, q)).find(|o| o.is_ne());

@@ -5,6 +5,7 @@ use super::node::{Expr, Node};
 use super::rational::Rational;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// What a polynomial is made of.
 #[derive(Debug)]
@@ -71,14 +72,23 @@ impl Polynomial {
         Polynomial(BTreeMap::from([(monomial, Rational::from(1))]))
     }
 
-    pub fn add_term(&mut self, monomial: Monomial, coefficient: Rational) {
-        let entry = self.0.entry(monomial).or_insert_with(|| Rational::from(0));
-        *entry = &*entry + &coefficient;
+    /// A single term.
+    fn term(monomial: Monomial, coefficient: Rational) -> Self {
+        Polynomial(BTreeMap::from([(trimmed(monomial), coefficient)]))
     }
 
-    pub fn plus(mut self, other: &Polynomial) -> Self {
-        for (monomial, coefficient) in &other.0 {
-            self.add_term(monomial.clone(), coefficient.clone());
+    pub fn add_term(&mut self, monomial: Monomial, coefficient: Rational) {
+        match self.0.entry(monomial) {
+            Entry::Vacant(place) => {
+                place.insert(coefficient);
+            }
+            Entry::Occupied(mut term) => *term.get_mut() = term.get() + &coefficient,
+        }
+    }
+
+    pub fn plus(mut self, other: Polynomial) -> Self {
+        for (monomial, coefficient) in other.0 {
+            self.add_term(monomial, coefficient);
         }
         self
     }
@@ -197,46 +207,96 @@ pub(super) fn expand(x: &Exprs, e: Expr, generators: &mut Generators) -> Option<
     if x.entry(e).depth > DEEPEST {
         return None;
     }
-    match x.node(e) {
-        Node::Number(value) => Some(Polynomial::constant(value.clone())),
-        Node::Add(terms) => {
-            let mut sum = Polynomial::default();
-            for &term in terms {
-                let term = expand(x, term, generators)?;
-                generators.work += term.0.len() as u64;
-                sum = sum.plus(&term);
-                if sum.0.len() > MOST_TERMS {
-                    return None;
-                }
+    let factors = match x.node(e) {
+        Node::Add(terms) => return expand_sum(x, terms, generators),
+        Node::Mul(factors) => &factors[..],
+        _ => &[e],
+    };
+    // Up to the first sum, if there is one, the product is a single term.
+    let (mut coefficient, mut monomial) = (Rational::from(1), Monomial::new());
+    for (at, &factor) in factors.iter().enumerate() {
+        match expand_factor(x, factor, generators) {
+            Factor::Number(value) => coefficient = if at == 0 { value.clone() } else { &coefficient * value },
+            Factor::Power(generator, n) => {
+                monomial.resize(monomial.len().max(generator + 1), 0);
+                monomial[generator] += n;
             }
-            Some(sum)
-        }
-        Node::Mul(factors) => {
-            let mut product = Polynomial::constant(Rational::from(1));
-            for &factor in factors {
-                let factor = expand(x, factor, generators)?;
-                product = generators.product(&product, &factor)?;
+            Factor::Sum(base, n) => {
+                let power = expand_power(x, base, n, generators)?;
+                let product = match at {
+                    0 => power,
+                    _ => generators.product(&Polynomial::term(monomial, coefficient), &power)?,
+                };
+                return expand_rest(x, product, &factors[at + 1..], generators);
             }
-            Some(product)
         }
-        Node::Pow(base, n) => expand_power(x, e, *base, *n, generators),
-        _ => Some(Polynomial::generator(generators.index_of(e), 1)),
+        generators.work += 1;
+    }
+    generators.affords(0).then(|| Polynomial::term(monomial, coefficient))
+}
+
+fn expand_sum(x: &Exprs, terms: &[Expr], generators: &mut Generators) -> Option<Polynomial> {
+    let mut sum = Polynomial::default();
+    for &term in terms {
+        let term = expand(x, term, generators)?;
+        generators.work += term.0.len() as u64;
+        sum = sum.plus(term);
+        if sum.0.len() > MOST_TERMS {
+            return None;
+        }
+    }
+    Some(sum)
+}
+
+/// A product with the factors that follow.
+fn expand_rest(
+    x: &Exprs,
+    mut product: Polynomial,
+    factors: &[Expr],
+    generators: &mut Generators,
+) -> Option<Polynomial> {
+    for &factor in factors {
+        let factor = match expand_factor(x, factor, generators) {
+            Factor::Number(value) => Polynomial::constant(value.clone()),
+            Factor::Power(generator, n) => Polynomial::generator(generator, n),
+            Factor::Sum(base, n) => expand_power(x, base, n, generators)?,
+        };
+        product = generators.product(&product, &factor)?;
+    }
+    Some(product)
+}
+
+/// What a factor of a product is.
+enum Factor<'a> {
+    Number(&'a Rational),
+    /// A power of a generator.
+    Power(usize, i64),
+    /// A positive power of a sum.
+    Sum(Expr, i64),
+}
+
+fn expand_factor<'a>(x: &'a Exprs, e: Expr, generators: &mut Generators) -> Factor<'a> {
+    match *x.node(e) {
+        Node::Number(ref value) => Factor::Number(value),
+        Node::Add(_) => Factor::Sum(e, 1),
+        Node::Pow(base, n) => match x.is_number(n).and_then(|n| n.as_integer()) {
+            // The inverse of what may be zero never cancels.
+            Some(n) if n < 0 && !x.nonzero(base) => Factor::Power(generators.index_of(e), 1),
+            Some(n) if n > 0 && matches!(x.node(base), Node::Add(_)) => Factor::Sum(base, n),
+            Some(n) => Factor::Power(generators.index_of(base), n),
+            None => Factor::Power(generators.index_of(e), 1),
+        },
+        _ => Factor::Power(generators.index_of(e), 1),
     }
 }
 
-fn expand_power(x: &Exprs, e: Expr, base: Expr, n: Expr, generators: &mut Generators) -> Option<Polynomial> {
-    let own = |generators: &mut Generators| Some(Polynomial::generator(generators.index_of(e), 1));
-    let Some(n) = x.is_number(n).and_then(|n| n.as_integer()) else { return own(generators) };
-    if n < 0 && !x.nonzero(base) {
-        // The inverse of what may be zero never cancels.
-        return own(generators);
+fn expand_power(x: &Exprs, base: Expr, n: i64, generators: &mut Generators) -> Option<Polynomial> {
+    if n > HIGHEST_POWER {
+        return None;
     }
-    if n > 0 && matches!(x.node(base), Node::Add(_)) {
-        if n > HIGHEST_POWER {
-            return None;
-        }
-        let base = expand(x, base, generators)?;
-        return (1..n).try_fold(base.clone(), |power, _| generators.product(&power, &base));
+    let base = expand(x, base, generators)?;
+    match n {
+        1 => Some(base),
+        _ => (1..n).try_fold(base.clone(), |power, _| generators.product(&power, &base)),
     }
-    Some(Polynomial::generator(generators.index_of(base), n))
 }

@@ -233,9 +233,10 @@ impl Exprs {
         }
     }
 
-    /// The entries below the given ones, parts before wholes; what stands inside [`Node::Whole`] left out.
-    pub(super) fn around_wholes(&self, roots: &[Expr]) -> SmallVec<[Expr; FEW]> {
-        self.seen_below(roots, &|_| true, &|node| !matches!(node, Node::Whole(_))).into_order()
+    /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept, and
+    /// nothing that stands inside [`Node::Whole`].
+    pub(super) fn around_wholes(&self, roots: &[Expr], keep: &dyn Fn(Expr) -> bool) -> SmallVec<[Expr; FEW]> {
+        self.seen_below(roots, keep, &|node| !matches!(node, Node::Whole(_))).into_order()
     }
 
     /// The entries below the given ones for which `keep` holds, parts before wholes; nothing below one that is not kept.

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::algebra::{Expr, Exprs, Node, NumericPoint, Symbol};
+use crate::algebra::{EvaluationOrder, Expr, Exprs, Node, NumericPoint, Symbol, ZERO};
 use crate::bond_graph::{BondGraph, Guess, Kind, Meaning, Storage, StorageLaw};
 use crate::ids::Map;
 
@@ -101,14 +101,14 @@ fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map
     }
     let unknowns: Vec<Symbol> = read.into_iter().collect();
     let mut x = x.clone();
-    let slopes: Vec<Vec<Expr>> =
-        constraints.iter().map(|&e| unknowns.iter().map(|&s| x.derivative(e, s)).collect()).collect();
+    let slopes = slopes(&mut x, &constraints, &unknowns);
+    let constraints = Constraints::new(&x, &constraints, &slopes, &unknowns);
     let mut best: Option<(f64, Vec<f64>)> = None;
     let guessed = guessed(&x, graph, values);
     for beginning in BEGINNINGS {
         unknowns.iter().for_each(|&s| _ = values.insert(s, beginning));
         values.extend(guessed.iter().filter(|(s, _)| unknowns.contains(s)).copied());
-        let missed = approach(&x, &constraints, &slopes, &unknowns, values);
+        let missed = approach(&constraints, values);
         if best.as_ref().is_none_or(|(known, _)| missed < *known) {
             best = Some((missed, unknowns.iter().map(|s| values[s]).collect()));
         }
@@ -121,35 +121,74 @@ fn close(x: &Exprs, graph: &BondGraph, open: &BTreeSet<Symbol>, values: &mut Map
     }
 }
 
+/// Derivatives of constraints by unknowns, each with its row and column, those that vanish left out.
+fn slopes(x: &mut Exprs, constraints: &[Expr], unknowns: &[Symbol]) -> Vec<(usize, usize, Expr)> {
+    let mut slopes = Vec::new();
+    for (i, &constraint) in constraints.iter().enumerate() {
+        let read = x.symbols_of(constraint);
+        for (j, &unknown) in unknowns.iter().enumerate().filter(|u| read.contains(u.1)) {
+            let slope = x.derivative(constraint, unknown);
+            slopes.extend((slope != ZERO).then_some((i, j, slope)));
+        }
+    }
+    slopes
+}
+
+/// Constraints on displacements, and what is needed to come nearer to them.
+struct Constraints<'a> {
+    unknowns: &'a [Symbol],
+    residuals: EvaluationOrder<'a>,
+    slopes: EvaluationOrder<'a>,
+    /// Row and column of each slope.
+    places: Vec<(usize, usize)>,
+    rows: usize,
+}
+
+impl<'a> Constraints<'a> {
+    fn new(x: &'a Exprs, constraints: &[Expr], slopes: &[(usize, usize, Expr)], unknowns: &'a [Symbol]) -> Self {
+        let derivatives: Vec<Expr> = slopes.iter().map(|slope| slope.2).collect();
+        Constraints {
+            unknowns,
+            residuals: EvaluationOrder::new(x, constraints),
+            slopes: EvaluationOrder::new(x, &derivatives),
+            places: slopes.iter().map(|slope| (slope.0, slope.1)).collect(),
+            rows: constraints.len(),
+        }
+    }
+
+    fn residuals(&self, values: &Map<Symbol, f64>) -> Vec<f64> {
+        self.residuals.values(&mut |s| values.get(&s).copied().unwrap_or(1.0))
+    }
+
+    fn jacobian(&self, values: &Map<Symbol, f64>) -> Vec<Vec<f64>> {
+        let mut jacobian = vec![vec![0.0; self.unknowns.len()]; self.rows];
+        let slopes = self.slopes.values(&mut |s| values.get(&s).copied().unwrap_or(1.0));
+        self.places.iter().zip(slopes).for_each(|(&(i, j), slope)| jacobian[i][j] = slope);
+        jacobian
+    }
+}
+
 /// Damped minimum-norm steps towards the constraints; the residual that remains.
-fn approach(
-    x: &Exprs,
-    constraints: &[Expr],
-    slopes: &[Vec<Expr>],
-    unknowns: &[Symbol],
-    values: &mut Map<Symbol, f64>,
-) -> f64 {
-    let at = |values: &Map<Symbol, f64>, e: Expr| x.eval(e, &mut |s| values.get(&s).copied().unwrap_or(1.0));
-    let missed = |values: &Map<Symbol, f64>| -> Vec<f64> { constraints.iter().map(|&e| at(values, e)).collect() };
-    let mut residual = missed(values);
+fn approach(constraints: &Constraints, values: &mut Map<Symbol, f64>) -> f64 {
+    let mut residual = constraints.residuals(values);
     for _ in 0..ITERATIONS {
-        let jacobian: Vec<Vec<f64>> = slopes.iter().map(|row| row.iter().map(|&e| at(values, e)).collect()).collect();
-        let Some(step) = least_step(&jacobian, &residual) else { break };
+        let Some(step) = least_step(&constraints.jacobian(values), &residual) else { break };
+        let from: Vec<f64> = constraints.unknowns.iter().map(|s| values[s]).collect();
         let mut fraction = 1.0;
-        let (next, left) = loop {
-            let mut next = values.clone();
-            unknowns.iter().zip(&step).for_each(|(&s, d)| _ = next.insert(s, values[&s] - fraction * d));
-            let left = missed(&next);
+        loop {
+            let moved = from.iter().zip(&step).map(|(from, step)| from - fraction * step);
+            constraints.unknowns.iter().zip(moved).for_each(|(&s, value)| _ = values.insert(s, value));
+            let left = constraints.residuals(values);
             if size(&left) < size(&residual) {
-                break (next, left);
+                residual = left;
+                break;
             }
             fraction *= 0.5;
             if fraction < 1e-6 {
+                constraints.unknowns.iter().zip(from).for_each(|(&s, value)| _ = values.insert(s, value));
                 return size(&residual);
             }
-        };
-        *values = next;
-        residual = left;
+        }
     }
     size(&residual)
 }

@@ -12,8 +12,7 @@ const SHORT: usize = 60;
 
 /// An expression as text if it is short, else which symbols of this kind it reads.
 pub(super) fn described(exprs: &Exprs, e: Expr, named: &dyn Fn(&Symbol) -> bool) -> String {
-    // What has more parts than that has a longer text.
-    if exprs.written_length(e) <= SHORT as u64 {
+    if least_text(exprs, e, SHORT) <= SHORT {
         let text = ascii(exprs, e, &PlainNames(exprs));
         if text.len() <= SHORT {
             return text;
@@ -21,6 +20,21 @@ pub(super) fn described(exprs: &Exprs, e: Expr, named: &dyn Fn(&Symbol) -> bool)
     }
     let read: Vec<&str> = exprs.symbols_of(e).into_iter().filter(named).map(|s| exprs.name(s)).collect();
     format!("an expression in {}", first_of(&read.join(", ")))
+}
+
+/// What the text of an expression has at least, as far as that tells whether it has more characters than this: its symbols and
+/// numbers. Long numbers take long to write.
+fn least_text(exprs: &Exprs, e: Expr, most: usize) -> usize {
+    let (mut length, mut open) = (0, vec![e]);
+    while let Some(e) = open.pop().filter(|_| length <= most) {
+        match exprs.node(e) {
+            Node::Symbol(s) => length += exprs.name(*s).len(),
+            Node::Add(parts) | Node::Mul(parts) => open.extend(parts.iter().filter(|&&part| part != MINUS_ONE)),
+            Node::Pow(part, _) | Node::Whole(part) => open.push(*part),
+            _ => length += 1,
+        }
+    }
+    length
 }
 
 /// Elements by their names, for messages.

@@ -2,7 +2,7 @@
 
 use super::super::exprs::Exprs;
 use super::super::node::{Expr, Node};
-use super::super::polynomial::{Generators, Monomial, Polynomial, expand, monomial_expr};
+use super::super::polynomial::{Generators, Polynomial, expand, monomial_expr};
 use super::super::rational::Rational;
 use super::least_length::{Lengths, Term};
 
@@ -84,33 +84,41 @@ impl Exprs {
         polynomial: &Polynomial,
         generators: &mut Generators,
         lengths: &Lengths,
-        mut shortest: u64,
+        shortest: u64,
     ) -> Option<Expr> {
         if polynomial.0.len() < 3 || polynomial.0.len() > 24 {
             return None;
         }
-        let mut best = None;
+        let split = |i: usize| -> (Vec<Term>, Vec<Term>) {
+            polynomial.0.iter().partition(|(monomial, _)| monomial.get(i).is_some_and(|&n| n != 0))
+        };
+        let mut candidates = Vec::new();
         for i in 0..generators.list.len() {
             generators.work += 4 * polynomial.0.len() as u64;
-            let holds = |m: &Monomial| m.get(i).is_some_and(|&n| n != 0);
-            let (with, without): (Vec<Term>, Vec<Term>) = polynomial.0.iter().partition(|(m, _)| holds(m));
-            if with.len() < 2 || without.is_empty() {
+            let (with, without) = split(i);
+            if with.len() >= 2 && !without.is_empty() {
+                let least = lengths.of_halves([&with, &without]);
+                candidates.extend((least < shortest).then_some((least, i)));
+            }
+        }
+        // What is short at least may be the shortest; most others then need not be formed.
+        candidates.sort_unstable();
+        let mut best: Option<(u64, usize, Expr)> = None;
+        for (least, i) in candidates {
+            if best.is_some_and(|(length, first, _)| (length, first) < (least, i)) {
                 continue;
             }
-            let least = lengths.of_halves([&with, &without]);
-            if least >= shortest {
-                continue;
-            }
+            let (with, without) = split(i);
             let parts = [with, without].map(|half| {
                 let half = half.into_iter().map(|(m, c)| (m.clone(), c.clone()));
                 self.factored(&Polynomial(half.collect()), generators)
             });
             let sum = self.add(&parts);
             let length = self.checked_length(sum, least);
-            if length < shortest {
-                (shortest, best) = (length, Some(sum));
+            if length < shortest && best.is_none_or(|(known, first, _)| (length, i) < (known, first)) {
+                best = Some((length, i, sum));
             }
         }
-        best
+        best.map(|(.., sum)| sum)
     }
 }

@@ -61,6 +61,9 @@ impl Exprs {
             Node::Add(terms) => terms.clone(),
             _ => smallvec![e],
         };
+        if !terms.iter().any(|&term| self.is_fraction(term)) {
+            return None;
+        }
         let split: Vec<(Expr, Vec<(Expr, i64)>)> = terms.iter().map(|&t| self.split_fraction(t)).collect();
         let mut below: Vec<(Expr, i64)> = Vec::new();
         for &(base, n) in split.iter().flat_map(|s| &s.1) {
@@ -81,7 +84,7 @@ impl Exprs {
                 let power = expand(self, power, generators)?;
                 product = generators.product(&product, &power)?;
             }
-            above = above.plus(&product);
+            above = above.plus(product);
         }
         let mut above = above.tidy(self, generators);
         above = self.reduce_trigonometric(above, generators);

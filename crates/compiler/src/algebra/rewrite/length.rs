@@ -3,43 +3,37 @@
 use super::super::exprs::Exprs;
 use super::super::node::{Expr, Node};
 use super::super::rational::Rational;
-use super::super::symbol_sets::FEW;
 use rustc_hash::FxHashMap;
-use smallvec::SmallVec;
 
 impl Exprs {
     /// How long the expression is written: symbols, numbers, operators and functions, shared parts each time.
     pub fn written_length(&self, e: Expr) -> u64 {
-        let parts = self.around_wholes(&[e]);
-        let mut lengths: SmallVec<[u64; FEW]> = SmallVec::with_capacity(parts.len());
-        for &part in &parts {
-            let mut length: u64 = match self.node(part) {
-                Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 1,
-                Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
-                Node::Whole(_) => {
-                    lengths.push(2);
-                    continue;
-                }
-                Node::Add(terms) => terms.len() as u64,
-                Node::Mul(factors) => factors.len() as u64 - 1,
-                // A fraction within a fraction reads badly.
-                Node::Pow(base, n) if *n == super::super::MINUS_ONE => 2 + 4 * u64::from(self.holds_fraction(*base)),
-                // An exponent is short however it is written, and a square is shorter than a product.
-                Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.is_integer()) => 0,
-                Node::Pow(..) => 1,
-                _ => 2,
-            };
-            let known = |c: Expr| lengths[parts.binary_search(&c).expect("parts come before wholes")];
-            self.node(part).for_each_child(|c| length = length.saturating_add(known(c)));
-            lengths.push(length);
-        }
-        lengths[lengths.len() - 1]
+        u64::from(self.entry(e).length)
+    }
+
+    /// The same of a node, by the lengths of its parts.
+    pub(in crate::algebra) fn length_of_node(&self, node: &Node) -> u32 {
+        let mut length: u32 = match node {
+            Node::Number(value) if value.is_one() || value == &Rational::from(-1) => 1,
+            Node::Number(_) | Node::Pi | Node::Symbol(_) => 2,
+            Node::Whole(_) => return 2,
+            Node::Add(terms) => terms.len() as u32,
+            Node::Mul(factors) => factors.len() as u32 - 1,
+            // A fraction within a fraction reads badly.
+            Node::Pow(base, n) if *n == super::super::MINUS_ONE => 2 + 4 * u32::from(self.holds_fraction(*base)),
+            // An exponent is short however it is written, and a square is shorter than a product.
+            Node::Pow(_, n) if self.is_number(*n).is_some_and(|n| n.is_integer()) => 0,
+            Node::Pow(..) => 1,
+            _ => 2,
+        };
+        node.for_each_child(|c| length = length.saturating_add(self.entry(c).length));
+        length
     }
 
     /// How long the expression is in print: a bar counts once, brackets and fractions within fractions count extra.
     pub fn printed_length(&self, e: Expr) -> u64 {
         let mut lengths: FxHashMap<Expr, u64> = FxHashMap::default();
-        for part in self.around_wholes(&[e]) {
+        for part in self.around_wholes(&[e], &|_| true) {
             let length = self.length_of(part, &lengths);
             lengths.insert(part, length);
         }
@@ -93,10 +87,15 @@ impl Exprs {
     /// Whether a term of the sum has a denominator.
     pub(super) fn holds_fraction(&self, sum: Expr) -> bool {
         let Node::Add(terms) = self.node(sum) else { return false };
-        terms.iter().any(|t| match self.node(*t) {
-            Node::Mul(factors) => factors.iter().any(|f| self.divides(*f)),
-            _ => self.divides(*t),
-        })
+        terms.iter().any(|&term| self.is_fraction(term))
+    }
+
+    /// Whether a product, or what stands alone, has a denominator.
+    pub(super) fn is_fraction(&self, e: Expr) -> bool {
+        match self.node(e) {
+            Node::Mul(factors) => factors.iter().any(|&factor| self.divides(factor)),
+            _ => self.divides(e),
+        }
     }
 
     /// Whether it is a power with a negative number for its exponent: it stands below a bar.

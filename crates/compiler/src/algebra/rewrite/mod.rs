@@ -31,15 +31,17 @@ enum Length {
 /// What the search for short forms remembers.
 #[derive(Clone)]
 pub(super) struct ShortForms {
-    /// The shortest forms that are known.
+    /// The shortest forms that are known, of expressions whose parts are short.
     known: FxHashMap<(Length, Expr), Expr>,
+    /// The shortest forms to evaluate, of whatever was a part of what one was asked for.
+    of_parts: FxHashMap<Expr, Expr>,
     /// Terms that may still be formed.
     left: u64,
 }
 
 impl Default for ShortForms {
     fn default() -> Self {
-        ShortForms { known: FxHashMap::default(), left: u64::MAX }
+        ShortForms { known: FxHashMap::default(), of_parts: FxHashMap::default(), left: u64::MAX }
     }
 }
 
@@ -47,6 +49,7 @@ impl ShortForms {
     /// Something new is known of expressions: other forms may hold now.
     pub fn forget(&mut self) {
         self.known.clear();
+        self.of_parts.clear();
     }
 }
 
@@ -65,9 +68,27 @@ impl Exprs {
         if self.written_length(short) > BOUND { self.whole(short) } else { short }
     }
 
-    /// The expressions, each in its shortest form to evaluate; what they share is looked at once.
+    /// The expressions, each in its shortest form to evaluate: from the leaves to the roots, so that the parts of what is
+    /// looked at are short already. What they share, and what was a part of others before, is looked at once.
     pub fn simplify_all(&mut self, roots: &[Expr]) -> Vec<Expr> {
-        self.shortest_forms(roots, Length::Evaluated)
+        let mut of_parts = std::mem::take(&mut self.short_forms.of_parts);
+        let order = self.around_wholes(roots, &|part| !of_parts.contains_key(&part));
+        self.spend(order.len() as u64);
+        for part in order {
+            let short = match self.node(part) {
+                Node::Whole(_) => part,
+                _ => {
+                    let rebuilt = self.rebuild(part, &|c| of_parts[&c]);
+                    self.shortest_form(rebuilt, Length::Evaluated)
+                }
+            };
+            of_parts.insert(part, short);
+        }
+        let short = roots.iter().map(|root| of_parts[root]).collect();
+        if !self.search_is_over() {
+            self.short_forms.of_parts = of_parts;
+        }
+        short
     }
 
     /// The expression as a textbook prints it: the shortest of itself, of all its terms over one denominator, and of
@@ -86,14 +107,20 @@ impl Exprs {
     /// assert_eq!(ascii(&x, e, &PlainNames(&x)), "R1*R2/(R1 + R2)");
     /// ```
     pub fn textbook(&mut self, e: Expr) -> Expr {
-        self.shortest_forms(&[e], Length::Printed)[0]
+        self.in_print(e)
     }
 
-    /// The search: from the leaves to the roots, so that the parts of what is looked at are short already.
-    fn shortest_forms(&mut self, roots: &[Expr], by: Length) -> Vec<Expr> {
-        let order = self.around_wholes(roots);
+    /// The search for one that is printed: a sum, product or power is read as a whole, with all the sums, products and powers
+    /// in it.
+    fn in_print(&mut self, root: Expr) -> Expr {
+        let order = self.around_wholes(&[root], &|_| true);
         self.spend(order.len() as u64);
-        let sought = self.sought(roots, &order, by);
+        let mut sought = FxHashSet::from_iter([root]);
+        for &part in order.iter().filter(|&&part| !self.is_arithmetic(part)) {
+            self.node(part).for_each_child(|c| {
+                sought.insert(c);
+            });
+        }
         let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
         for part in order {
             if matches!(self.node(part), Node::Whole(_)) {
@@ -101,27 +128,10 @@ impl Exprs {
                 continue;
             }
             let rebuilt = self.rebuild(part, &|c| new[&c]);
-            let short = if sought.contains(&part) { self.shortest_form(rebuilt, by) } else { rebuilt };
+            let short = if sought.contains(&part) { self.shortest_form(rebuilt, Length::Printed) } else { rebuilt };
             new.insert(part, short);
         }
-        roots.iter().map(|r| new[r]).collect()
-    }
-
-    /// The parts whose short form is sought. What is evaluated is made of parts, which others may share. What is printed
-    /// is read as a whole: a sum, product or power with all the sums, products and powers in it.
-    fn sought(&self, roots: &[Expr], order: &[Expr], by: Length) -> FxHashSet<Expr> {
-        match by {
-            Length::Evaluated => order.iter().copied().collect(),
-            Length::Printed => {
-                let mut whole: FxHashSet<Expr> = roots.iter().copied().collect();
-                for &part in order.iter().filter(|&&p| !self.is_arithmetic(p)) {
-                    self.node(part).for_each_child(|c| {
-                        whole.insert(c);
-                    });
-                }
-                whole
-            }
-        }
+        new[&root]
     }
 
     fn is_arithmetic(&self, e: Expr) -> bool {

@@ -244,7 +244,7 @@ impl Exprs {
                     product = generators.product(&product, &power)?;
                 }
             }
-            above = above.plus(&product);
+            above = above.plus(product);
         }
         Some(Ratio { above: above.tidy(self, generators), below })
     }

@@ -64,7 +64,7 @@ impl Exprs {
                     better.0.remove(&times(&rest, &second));
                     let value = expand(self, value, generators)?;
                     let scaled = Polynomial([(rest, c)].into_iter().collect());
-                    return Some(better.plus(&scaled.times(&value)?));
+                    return Some(better.plus(scaled.times(&value)?));
                 }
             }
         }
