@@ -1,6 +1,6 @@
 //! How far apart two runs are that only their steps tell apart.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use halfarrow_trace::{Column, Trace};
 
@@ -18,7 +18,8 @@ pub(crate) fn apart(run: &Trace, other: &Trace) -> Option<Deviation> {
         let scale = scales.entry(&column.unit).or_insert(0.0);
         *scale = scale.max(greatest(column));
     }
-    let pairs = run.columns.iter().filter_map(|column| Some((column, other.column(&column.name)?)));
+    let named: HashMap<&str, &Column> = other.columns.iter().map(|column| (column.name.as_str(), column)).collect();
+    let pairs = run.columns.iter().filter_map(|column| Some((column, *named.get(column.name.as_str())?)));
     let compared = pairs.filter_map(|(column, beside)| {
         let size = greatest(column).max(greatest(beside));
         let is_there = size > NOTHING && size > ROUNDING * scales[column.unit.as_str()];

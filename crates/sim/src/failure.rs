@@ -348,7 +348,7 @@ impl fmt::Display for Failure {
             Failure::Bound { time, what, most } => write!(
                 f,
                 "{} the equations of {what} are not solved after {most} evaluations, which is the bound; shorten the step, or allow more \
-                 where steps have a deadline (--bound)",
+                 where steps have a deadline (`run --bound`)",
                 When(*time)
             ),
             Failure::StepTooSmall { time, step } => write!(

@@ -38,11 +38,16 @@ impl SymbolicFactors {
     /// The factors of a matrix with this pattern, if that is large and they are sparse; `None` too if it is singular
     /// whatever its entries are.
     pub fn of_large(pattern: &Pattern) -> Option<SymbolicFactors> {
+        SymbolicFactors::of_large_within(pattern, u64::MAX)
+    }
+
+    /// The same; `None` too if rows take off more than so many operations from others, which is found out on the way.
+    pub fn of_large_within(pattern: &Pattern, most: u64) -> Option<SymbolicFactors> {
         if pattern.size() <= SMALL {
             return None;
         }
         let full = full_operations(pattern.size());
-        let factors = SymbolicFactors::within(pattern, full / GAIN)?;
+        let factors = SymbolicFactors::within(pattern, most.min(full / GAIN))?;
         (GAIN * factors.operations() < full).then(|| factors.lowered(pattern))
     }
 
@@ -148,7 +153,7 @@ fn matched(pattern: &Pattern) -> Option<Vec<usize>> {
         (0..n).map(|row| pattern.columns_of(row).iter().map(|&c| c as usize).collect()).collect();
     let mut matching = Matching::new(n);
     (0..n).filter(|&i| pattern.entry(i, i).is_some()).for_each(|i| matching.join(i, i));
-    (0..n).for_each(|row| matching.augment(row, &edges));
+    matching.complete(&edges);
     matching.row_of.into_iter().collect()
 }
 

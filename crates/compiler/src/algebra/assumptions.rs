@@ -5,7 +5,7 @@
 //! values made, be it that an expression is above zero or that it vanishes, stands there with the expression it was about.
 //! In the end these are brought down to what must hold of parameters alone (`needed.rs`).
 
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -44,7 +44,7 @@ pub struct Assumptions {
     /// What is defined because it is a part of what was divided by.
     defined: FxHashSet<Expr>,
     /// Of each expression what has been decided by the values of parameters.
-    decided: Vec<Decided>,
+    decided: Vec<Eight>,
     /// What the divisors tell of other expressions, as far as it was looked for.
     found: Mutex<FxHashMap<Expr, Known>>,
 }
@@ -58,12 +58,16 @@ impl Clone for Assumptions {
 }
 
 /// What has been decided of an expression: a set of the answers below.
-#[derive(Debug, Default)]
-pub(super) struct Decided(AtomicU8);
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Decided(u8);
 
-impl Clone for Decided {
-    fn clone(&self) -> Decided {
-        Decided(AtomicU8::new(self.0.load(Ordering::Relaxed)))
+/// What has been decided of eight expressions in a row: who tries something takes all of it along, again and again.
+#[derive(Debug, Default)]
+struct Eight(AtomicU64);
+
+impl Clone for Eight {
+    fn clone(&self) -> Eight {
+        Eight(AtomicU64::new(self.0.load(Ordering::Relaxed)))
     }
 }
 
@@ -80,42 +84,38 @@ impl Decided {
     /// It is not zero at the given parameters, whatever its signs tell.
     pub const GIVEN_NOT_ZERO: u8 = 64;
 
-    fn add(&self, what: u8) {
-        if !self.has(what) {
-            self.0.fetch_or(what, Ordering::Relaxed);
-        }
-    }
-
-    pub(super) fn has(&self, what: u8) -> bool {
-        self.0.load(Ordering::Relaxed) & what != 0
+    pub(super) fn has(self, what: u8) -> bool {
+        self.0 & what != 0
     }
 
     /// The signs that were read out of what is known.
-    pub(super) fn claims(&self) -> impl Iterator<Item = Signs> + use<> {
+    pub(super) fn claims(self) -> impl Iterator<Item = Signs> + use<> {
         let all =
             [(Self::NOT_ZERO, Signs::NOT_ZERO), (Self::POSITIVE, Signs::PLUS), (Self::NOT_NEGATIVE, Signs::NOT_MINUS)];
-        let own = self.0.load(Ordering::Relaxed);
-        all.into_iter().filter(move |(what, _)| own & what != 0).map(|(_, signs)| signs)
+        all.into_iter().filter(move |(what, _)| self.has(*what)).map(|(_, signs)| signs)
     }
 }
 
 impl Assumptions {
     /// Room for the decisions on so many expressions.
     pub(super) fn cover(&mut self, entries: usize) {
-        self.decided.resize_with(entries, Decided::default);
+        self.decided.resize_with(entries.div_ceil(8), Eight::default);
     }
 
     pub(super) fn decide(&self, e: Expr, what: u8) {
-        self.decided[e.0 as usize].add(what);
+        if !self.decided(e).has(what) {
+            self.decided[e.0 as usize / 8].0.fetch_or(u64::from(what) << (8 * (e.0 % 8)), Ordering::Relaxed);
+        }
     }
 
-    pub(super) fn decided(&self, e: Expr) -> &Decided {
-        &self.decided[e.0 as usize]
+    pub(super) fn decided(&self, e: Expr) -> Decided {
+        let eight = self.decided[e.0 as usize / 8].0.load(Ordering::Relaxed);
+        Decided((eight >> (8 * (e.0 % 8))) as u8)
     }
 
     /// The expressions of which this was decided, parts before wholes.
     pub(super) fn all_decided(&self, what: u8) -> Vec<Expr> {
-        (0..self.decided.len() as u32).map(Expr).filter(|&e| self.decided(e).has(what)).collect()
+        (0..8 * self.decided.len() as u32).map(Expr).filter(|&e| self.decided(e).has(what)).collect()
     }
 
     pub(super) fn has_divisors(&self) -> bool {

@@ -249,6 +249,8 @@ pub struct Eliminator<A: Coefficients = Exprs> {
     stamps: Vec<u32>,
     /// Where pivots should not be small.
     point: Option<NumericPoint>,
+    /// Room for the next row.
+    spare: Vec<(usize, A::Entry)>,
     done: Elimination<A::Entry>,
 }
 
@@ -265,6 +267,7 @@ impl<A: Coefficients> Eliminator<A> {
             column_rows: vec![Vec::new(); columns],
             stamps: vec![0; columns],
             point: None,
+            spare: Vec::new(),
             done: Elimination::default(),
         };
         for (i, row) in rows.into_iter().enumerate() {
@@ -399,25 +402,33 @@ impl<A: Coefficients> Eliminator<A> {
 
     /// Takes the pivot's column out of a row, which may have lost it already.
     fn subtract(&mut self, x: &mut A, other: usize, pivot: &[(usize, A::Entry)], column: usize) {
-        let Some(own) = coefficient(&self.rows[other], column) else { return };
-        let minus = x.minus(own);
+        let Ok(at) = self.rows[other].binary_search_by_key(&column, |e| e.0) else { return };
         let row = std::mem::take(&mut self.rows[other]);
-        let mut reduced = Vec::with_capacity(row.len() + pivot.len() - 2);
-        let mut row = row.into_iter().filter(|e| e.0 != column).peekable();
-        for &(c, e) in pivot.iter().filter(|e| e.0 != column) {
-            reduced.extend(std::iter::from_fn(|| row.next_if(|e| e.0 < c)));
-            let change = x.times(minus, e);
-            let before = row.next_if(|e| e.0 == c);
-            let after = before.map_or(change, |(_, e)| x.plus(e, change));
-            if !self.vanishes(x, after) {
-                reduced.push((c, after));
-                if before.is_none() {
-                    self.column_rows[c].push(other as u32);
+        let minus = x.minus(row[at].1);
+        let mut reduced = std::mem::take(&mut self.spare);
+        reduced.clear();
+        reduced.reserve(row.len() + pivot.len());
+        // Rows may be long: what stands between two entries of the pivot is taken over in one go.
+        let own = pivot.partition_point(|e| e.0 < column);
+        for (mut rest, entries) in [(&row[..at], &pivot[..own]), (&row[at + 1..], &pivot[own + 1..])] {
+            for &(c, e) in entries {
+                let run = rest.iter().take_while(|e| e.0 < c).count();
+                reduced.extend_from_slice(&rest[..run]);
+                let before = rest.get(run).filter(|e| e.0 == c).map(|e| e.1);
+                rest = &rest[run + usize::from(before.is_some())..];
+                let change = x.times(minus, e);
+                let after = before.map_or(change, |before| x.plus(before, change));
+                if !self.vanishes(x, after) {
+                    reduced.push((c, after));
+                    if before.is_none() {
+                        self.column_rows[c].push(other as u32);
+                    }
                 }
             }
+            reduced.extend_from_slice(rest);
         }
-        reduced.extend(row);
         self.rows[other] = reduced;
+        self.spare = row;
     }
 
     /// What has been eliminated, and what is left.

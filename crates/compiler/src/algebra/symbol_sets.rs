@@ -190,6 +190,21 @@ impl Exprs {
         Symbols(found)
     }
 
+    /// The symbols that several expressions read, some of them more than once. Parts that were `met` are passed over, and those
+    /// that are met now are added: what expressions share is gone through once.
+    pub fn symbols_met(&self, roots: &[Expr], met: &mut FxHashSet<Expr>) -> Vec<Symbol> {
+        let mut found = Vec::new();
+        for &root in roots {
+            self.walk(root, |pool, part| {
+                let small = pool.sets.get(pool.entry(part).symbols);
+                let new = met.insert(part);
+                found.extend(small.filter(|_| new).into_iter().flatten());
+                new && small.is_none()
+            });
+        }
+        found
+    }
+
     /// Whether the expression reads no symbol.
     pub fn is_constant(&self, e: Expr) -> bool {
         self.entry(e).symbols == EMPTY

@@ -10,6 +10,7 @@ use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
 use super::names::{self, Name};
 use super::overrides::{self, Override};
+use super::recognise::{Recognised, Unstarted};
 use super::shapes::ShapeDraft;
 use super::uses::Uses;
 use super::wire::{Wiring, wire};
@@ -133,11 +134,17 @@ fn build(
     }
     b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
-    let faults = faults.into_list();
-    Built { graph: finished(b, title, kinds, (asked, clauses, shapes), &relations, &rates), faults, uses }
+    let mut faults = faults.into_list();
+    let finished = finished(b, title, kinds, (asked, clauses, shapes), &relations, &rates);
+    let graph = finished.map(|(graph, unstarted)| {
+        faults.extend(unstarted.iter().filter_map(|signal| signal.warning(&graph)));
+        graph
+    });
+    Built { graph, faults, uses }
 }
 
-/// The graph of what has been read without a fault; `None` if something is missing nevertheless.
+/// The graph of what has been read without a fault, and signals that begin like storages; `None` if something is missing
+/// nevertheless.
 fn finished(
     mut b: Builder<'_, '_>,
     title: &Title,
@@ -145,17 +152,17 @@ fn finished(
     (asked, clauses, shapes): (Asked, Vec<Clause>, Vec<ShapeDraft>),
     relations: &[Relation],
     rates: &BTreeMap<Symbol, Expr>,
-) -> Option<BondGraph> {
+) -> Option<(BondGraph, Vec<Unstarted>)> {
     let mut structure = b.drawn(kinds.into_iter().collect::<Option<_>>()?);
     let constraints = b.build_constraints(&mut structure, relations);
-    let (signals, repeated) = b.recognise_storages(&structure, rates)?;
+    let Recognised { signals, repeated, unstarted } = b.recognise_storages(&structure, rates)?;
     let held = b.whole_held()?;
     let set_valued = std::mem::take(&mut b.set_valued);
     let (lets, outputs) = (std::mem::take(&mut b.lets), std::mem::take(&mut b.outputs));
     let (lets, outputs) = (b.whole_named(lets), b.whole_named(outputs));
     let shapes = shapes.into_iter().map(|shape| b.whole_shape(shape)).collect();
     let laws = Laws { structure, signals, held, lets, outputs, constraints, set_valued, clauses, shapes };
-    b.assemble(title, asked, laws, [rates, &repeated])
+    Some((b.assemble(title, asked, laws, [rates, &repeated])?, unstarted))
 }
 
 /// What building has given.

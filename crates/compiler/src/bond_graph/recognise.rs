@@ -5,20 +5,55 @@ use std::collections::BTreeMap;
 use super::builder::{Builder, NamedDraft, SignalDraft};
 use super::dimension::Quantity;
 use super::structure::Structure;
-use super::{ElementId, IntegratedSignal, Kind, Meaning, PortRef, SignalId, Storage, StorageLaw};
-use crate::algebra::{Expr, Node, Symbol};
+use super::{
+    BondGraph, Constraint, ElementId, IntegratedSignal, Kind, Meaning, PortRef, SignalId, Storage, StorageLaw,
+};
+use crate::algebra::{Expr, Node, Symbol, ZERO};
+use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::{Id, Table};
+use crate::span::Span;
+
+/// What tells the integrated signals.
+pub(super) struct Recognised {
+    pub signals: Table<SignalId, IntegratedSignal>,
+    /// What takes the place of those that repeat a stored quantity.
+    pub repeated: BTreeMap<Symbol, Expr>,
+    /// Those among them of which neither has a start value.
+    pub unstarted: Vec<Unstarted>,
+}
+
+/// A signal that repeats the stored quantity of a storage that pushes nothing where this is 0, neither with a start value.
+pub(super) struct Unstarted {
+    signal: (Symbol, Span),
+    stored: Symbol,
+    storage: ElementId,
+}
+
+impl Unstarted {
+    /// What a constraint brings together at the start is strained or moves then, of which the text does not speak.
+    pub fn warning(&self, graph: &BondGraph) -> Option<Diagnostic> {
+        let x = &graph.exprs;
+        let read = |c: &&Constraint| c.holonomic && x.symbols_of(c.expr).contains(&self.stored);
+        let constraint = graph.constraints.iter().find(read)?;
+        let (signal, stored) = (x.name(self.signal.0), x.name(self.stored));
+        let (storage, relation) = (&graph.elements[self.storage].name, &constraint.name);
+        let title = format!("`{storage}` begins with what constraints make of `{signal}`");
+        let what = format!("the same as `{stored}`, of which no start value is given");
+        let start = if matches!(graph.elements[self.storage].kind, Kind::Compliance(_)) { "q0" } else { "p0" };
+        let hint = format!(
+            "if `{storage}` holds nothing at the start, give it `{start} = 0`; if it holds nothing where `{signal}` is 0, \
+             read `{stored}` in the place of `{signal}`"
+        );
+        let warning = Diagnostic::warning(codes::I008, title, self.signal.1, what);
+        Some(warning.also(constraint.span, format!("`{relation}` puts it somewhere at the start")).hint(hint))
+    }
+}
 
 impl Builder<'_, '_> {
     /// Tells the signals that repeat a stored quantity up to a constant, which both start values must tell, from those that
-    /// are integrated. The names of the former stay as named expressions. Gives the integrated ones, and what takes the place
-    /// of the others; `None` if one has no rate.
-    pub fn recognise_storages(
-        &mut self,
-        structure: &Structure,
-        rates: &BTreeMap<Symbol, Expr>,
-    ) -> Option<(Table<SignalId, IntegratedSignal>, BTreeMap<Symbol, Expr>)> {
-        let mut replaced = BTreeMap::new();
+    /// are integrated. The names of the former stay as named expressions. `None` if one has no rate.
+    pub fn recognise_storages(&mut self, structure: &Structure, rates: &BTreeMap<Symbol, Expr>) -> Option<Recognised> {
+        let (mut repeated, mut unstarted) = (BTreeMap::new(), Vec::new());
         let mut kept: Vec<IntegratedSignal> = Vec::new();
         let signals = std::mem::take(&mut self.signals).into_values().enumerate();
         for (at, SignalDraft { name, symbol, rate, initial, unit, span }) in signals {
@@ -26,8 +61,11 @@ impl Builder<'_, '_> {
             let rate = self.exprs.substitute(written, rates);
             let own_way = self.reset.contains(&symbol);
             match if own_way { None } else { self.repeated(structure, rate, initial) } {
-                Some(value) => {
-                    replaced.insert(symbol, value);
+                Some((value, port)) => {
+                    repeated.insert(symbol, value);
+                    if initial.is_none() {
+                        unstarted.extend(self.unstarted(structure, (symbol, span), port));
+                    }
                     self.roles[symbol.0 as usize] = None;
                     let (doc, quantity) = (String::new(), Quantity::Any);
                     let place = (span, at);
@@ -39,11 +77,28 @@ impl Builder<'_, '_> {
                 }
             }
         }
-        Some((kept.into_iter().collect(), replaced))
+        Some(Recognised { signals: kept.into_iter().collect(), repeated, unstarted })
     }
 
-    /// The stored quantity, and a constant, that an integral of a rate is.
-    fn repeated(&mut self, structure: &Structure, rate: Expr, start: Option<Expr>) -> Option<Expr> {
+    /// A signal that is the stored quantity at this port, if the storage pushes nothing where that is 0.
+    fn unstarted(&mut self, structure: &Structure, signal: (Symbol, Span), port: PortRef) -> Option<Unstarted> {
+        let (Kind::Compliance(storage) | Kind::Inertance(storage)) = &structure.elements[port.element].kind else {
+            return None;
+        };
+        let stored = storage.stored[port.port as usize];
+        let relaxed = match storage.laws[port.port as usize] {
+            StorageLaw::Integral(law) => {
+                let at_zero = BTreeMap::from_iter(storage.stored.iter().map(|&stored| (stored, ZERO)));
+                let pushes = self.exprs.substitute(law, &at_zero);
+                self.exprs.is_zero(pushes)
+            }
+            _ => false,
+        };
+        relaxed.then_some(Unstarted { signal, stored, storage: port.element })
+    }
+
+    /// The stored quantity, and a constant, that an integral of a rate is, with the port at which it is stored.
+    fn repeated(&mut self, structure: &Structure, rate: Expr, start: Option<Expr>) -> Option<(Expr, PortRef)> {
         let Node::Symbol(symbol) = self.exprs.node(rate) else { return None };
         let (port, storage) = self.storage_with_rate(structure, *symbol)?;
         let stored = storage.stored[port.port as usize];
@@ -59,9 +114,9 @@ impl Builder<'_, '_> {
                 // What cancels has a value wherever the start values have one.
                 let offset = self.exprs.sub(start, own);
                 let offset = self.exprs.without_settled_terms(offset);
-                Some(self.exprs.add(&[x, offset]))
+                Some((self.exprs.add(&[x, offset]), port))
             }
-            (None, None) if !other => Some(x),
+            (None, None) if !other => Some((x, port)),
             _ => None,
         }
     }

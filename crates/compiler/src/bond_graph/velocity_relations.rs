@@ -294,7 +294,7 @@ impl Rows {
             .map(|row| row.0.iter().map(|e| e.0).filter(|c| !self.positions.contains(c)).collect())
             .collect();
         let mut matching = Matching::new(self.columns.len().max(rows.len()));
-        (0..rows.len()).for_each(|row| matching.augment(row, &edges));
+        matching.complete(&edges);
         let mut open: Vec<usize> = (0..rows.len()).filter(|&r| matching.column_of[r].is_none()).collect();
         let mut reached: BTreeSet<usize> = open.iter().copied().collect();
         while let Some(row) = open.pop() {

@@ -199,7 +199,7 @@ fn matching(x: &Exprs, rows: &[&SparseRow], done: &Elimination, any: bool) -> Op
                 found.join(row, row);
             }
         }
-        (0..rows.len()).for_each(|row| found.augment(row, &allowed));
+        found.complete(&allowed);
     }
     let all: Option<Vec<usize>> = found.row_of.into_iter().collect();
     Some(done.pivots.iter().map(|p| p.column).zip(all?).collect())

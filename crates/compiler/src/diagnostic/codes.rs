@@ -109,6 +109,7 @@ codes! {
     I005 "a start value that is no number";
     I006 "a guess of what is never searched";
     I007 "a guess that is never used (warning)";
+    I008 "a storage that begins with what constraints make of what repeats it (warning)";
 }
 
 #[cfg(test)]

@@ -27,8 +27,9 @@ const LONGEST: u64 = 600;
 
 /// Loops with at most so many unknowns are left as they are torn.
 pub(super) const FEW: usize = 32;
-/// What is tried for the number of unknowns that a variable may read in a larger loop.
-const LONGEST_ROWS: [usize; 5] = [usize::MAX, 16, 8, 4, 2];
+/// What is tried for the number of unknowns that a variable may read in a larger loop; the greatest of those that take the same
+/// operations. Few make a sparse matrix, which tells how much the others may take.
+const LONGEST_ROWS: [usize; 5] = [2, 4, 8, 16, usize::MAX];
 
 /// A loop is gone through from its leaves where that takes less than this part of the operations: a matrix is read more easily,
 const MUCH_FEWER: f64 = 0.75;
@@ -318,8 +319,15 @@ fn kept_sparse(x: &mut Exprs, torn: Vec<Symbol>, body: Vec<(Symbol, Expr)>, resi
     if torn.len() <= FEW {
         return (torn, body, residuals);
     }
-    let plans = LONGEST_ROWS.map(|longest| Supports::of(x, &torn, &body, &residuals, longest));
-    let best = plans.into_iter().min_by_key(Supports::operations).expect("there are several");
+    let mut best: Option<(u64, Supports)> = None;
+    for longest in LONGEST_ROWS {
+        let plan = Supports::of(x, &torn, &body, &residuals, longest);
+        let most = best.as_ref().map_or(u64::MAX, |best| best.0);
+        if let Some(operations) = plan.operations(most) {
+            best = Some((operations, plan));
+        }
+    }
+    let (_, best) = best.expect("the first takes no more than any number");
     let mut whole = (torn, Vec::with_capacity(body.len()), residuals);
     for (symbol, value) in body {
         if best.unknown.contains_key(&symbol) {

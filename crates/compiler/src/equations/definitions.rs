@@ -178,8 +178,7 @@ impl<'a> Definitions<'a> {
 
     /// Whether an expression keeps its value during a run: it reads parameters only.
     pub fn is_constant(&self, e: Expr) -> bool {
-        let constant = |s: &Symbol| matches!(self.meaning(*s), Some(Meaning::Parameter(_)));
-        self.x.symbols_of(e).iter().all(constant)
+        !self.x.depends_on_any(e, &|s| !matches!(self.meaning(s), Some(Meaning::Parameter(_))))
     }
 
     /// The time derivative of an expression. Symbols whose rates it needs are defined on the way.

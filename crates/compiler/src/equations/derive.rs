@@ -214,12 +214,15 @@ fn order_equations(
     }
     // A divisor vanishes where any number of times it does.
     let mut watched = BTreeSet::new();
+    let readers = if causal.ports.watched.is_empty() { BTreeMap::new() } else { readers(&d) };
     for &pivot in &causal.ports.watched {
         let (_, pivot) = d.x.primitive(pivot);
         if !watched.insert(pivot) {
             continue;
         }
-        ordered.steps.push(EquationStep::Guard { pivot, elements: readers(&d, pivot) });
+        let read = d.x.symbols_of(pivot);
+        let elements: BTreeSet<ElementId> = read.iter().filter_map(|s| readers.get(s)).flatten().copied().collect();
+        ordered.steps.push(EquationStep::Guard { pivot, elements: elements.into_iter().collect() });
     }
     let momenta = known(&d, momenta).into_iter();
     let of_the_bond = |d: &Definitions, symbol| of_the_bond(d, truth, symbol);
@@ -541,11 +544,14 @@ fn span_of_symbols(graph: &BondGraph, symbols: &[Symbol]) -> Span {
     symbols.iter().find_map(span).unwrap_or_default()
 }
 
-/// The elements whose moduli read what a pivot reads.
-fn readers(d: &Definitions, pivot: crate::algebra::Expr) -> Vec<ElementId> {
-    let symbols = d.x.symbols_of(pivot);
-    let reads = |m| d.x.symbols_of(m).iter().any(|s| symbols.contains(s));
-    d.graph.elements.iter().filter(|(_, e)| e.kind.moduli().into_iter().any(reads)).map(|(id, _)| id).collect()
+/// The elements whose moduli read each symbol.
+fn readers(d: &Definitions) -> BTreeMap<Symbol, Vec<ElementId>> {
+    let mut readers: BTreeMap<Symbol, Vec<ElementId>> = BTreeMap::new();
+    for (id, element) in d.graph.elements.iter() {
+        let read = element.kind.moduli().into_iter().flat_map(|modulus| d.x.symbols_of(modulus));
+        read.for_each(|symbol| readers.entry(symbol).or_default().push(id));
+    }
+    readers
 }
 
 fn unit_of(graph: &BondGraph, symbol: Symbol) -> Option<Unit> {

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use petgraph::unionfind::UnionFind;
+use rustc_hash::FxHashMap;
 
 use super::definitions::{Definition, Definitions};
 use super::loops::by_gains;
@@ -699,7 +700,7 @@ pub(super) fn groups(
     speeds: &[Virtual],
     rows: &mut Rows,
 ) -> Vec<(Vec<usize>, Vec<Virtual>)> {
-    let mut index: BTreeMap<Symbol, usize> = storage_ports.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
+    let mut index: FxHashMap<Symbol, usize> = storage_ports.iter().enumerate().map(|(i, c)| (c.z, i)).collect();
     index.extend(speeds.iter().enumerate().map(|(k, v)| (v.speed, storage_ports.len() + k)));
     let mut set = UnionFind::<usize>::new(storage_ports.len() + speeds.len());
     let mut last: BTreeMap<ElementId, usize> = BTreeMap::new();

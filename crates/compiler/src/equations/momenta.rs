@@ -1,7 +1,7 @@
 //! What stays as it is where a source jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
 //! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
-use std::collections::BTreeSet;
+use rustc_hash::FxHashSet;
 
 use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, groups, imposed, rows_of};
@@ -34,7 +34,7 @@ impl Assembled<'_> {
             if dependent.is_empty() {
                 continue;
             }
-            let mut inputs = BTreeSet::new();
+            let mut inputs = FxHashSet::default();
             dependent.iter().for_each(|c| inputs.extend(rows.inputs_of(&mut self.d.x, c.z)));
             let mut givers = inputs.iter().filter_map(|&input| rows.giver(input));
             let moved = givers.any(|giver| is_moving(&mut self.d, truth, giver));

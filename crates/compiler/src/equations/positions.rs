@@ -231,7 +231,7 @@ fn matched(rows: &[Row], chosen: &BTreeSet<usize>) -> Option<Vec<(usize, usize)>
     let edges: Vec<Vec<usize>> =
         rows.iter().map(|row| row.slopes.iter().filter_map(|(c, _)| place.get(c).copied()).collect()).collect();
     let mut matching = Matching::new(rows.len().max(columns.len()));
-    (0..rows.len()).for_each(|row| matching.augment(row, &edges));
+    matching.complete(&edges);
     let pairs: Vec<(usize, usize)> =
         (0..columns.len()).filter_map(|k| Some((matching.row_of[k]?, columns[k]))).collect();
     (pairs.len() == columns.len()).then_some(pairs)

@@ -289,7 +289,7 @@ impl Sum<'_, '_> {
     fn finish(self) -> Option<Row> {
         let missing = &self.assembled.d.missing;
         let x = &self.assembled.d.x;
-        let without_value = |e: Expr| x.depends_on_any(e, &|s| missing.contains_key(&s));
+        let without_value = |e: Expr| !missing.is_empty() && x.depends_on_any(e, &|s| missing.contains_key(&s));
         let unknown = self.row.quantity.iter().any(|(f, s)| missing.contains_key(s) || without_value(*f))
             || self.row.by.values().any(|&c| without_value(c));
         (!unknown).then_some(self.row)

@@ -41,9 +41,11 @@ impl Supports {
         Supports { unknown, pattern }
     }
 
-    /// Additions and products to form the matrix, to factor it and to solve the equations.
-    pub fn operations(&self) -> u64 {
-        to_solve(&self.pattern) + 2 * self.pattern.len() as u64
+    /// Additions and products to form the matrix, to factor it and to solve the equations; `None` if these are more than `most`.
+    pub fn operations(&self, most: u64) -> Option<u64> {
+        let forming = 2 * self.pattern.len() as u64;
+        let solving = to_solve_within(&self.pattern, most.checked_sub(forming)?)?;
+        Some(solving + forming)
     }
 }
 
@@ -51,4 +53,13 @@ impl Supports {
 pub fn to_solve(pattern: &Pattern) -> u64 {
     let full = full_operations(pattern.size());
     SymbolicFactors::of_large(pattern).map_or(full, |factors| factors.operations())
+}
+
+/// The same; `None` if these are more than `most`, which is found out on the way.
+fn to_solve_within(pattern: &Pattern, most: u64) -> Option<u64> {
+    let full = full_operations(pattern.size());
+    if full <= most {
+        return Some(to_solve(pattern));
+    }
+    SymbolicFactors::of_large_within(pattern, most).map(|factors| factors.operations()).filter(|&found| found <= most)
 }

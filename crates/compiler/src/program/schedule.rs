@@ -83,7 +83,7 @@ fn evaluated(equations: &Equations) -> Evaluated {
     let mut roots = equations.residuals.clone();
     let mut seen = vec![false; equations.steps.len()];
     let mut open: Vec<Symbol> = equations.states.iter().map(|s| s.rate).collect();
-    let mut read = 0;
+    let (mut read, mut met) = (0, FxHashSet::default());
     loop {
         while let Some(symbol) = open.pop() {
             let step = step_of[symbol.0 as usize].map(|i| i as usize);
@@ -101,7 +101,7 @@ fn evaluated(equations: &Equations) -> Evaluated {
         if read == roots.len() {
             return Evaluated { exprs: exprs.below(&roots, &|_| true), wholes: roots, needed: seen };
         }
-        roots[read..].iter().for_each(|&e| open.extend(exprs.symbols_of(e).iter()));
+        open = exprs.symbols_met(&roots[read..], &mut met);
         read = roots.len();
     }
 }
