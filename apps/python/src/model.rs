@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use halfarrow::{
     Compare, Compiled, DrawOptions, DrawnPaths, Error, Export, Form, Gradient, Library, Override, Picture, PlotOptions,
-    Problem, Real, Reduce, Report, Source, Stage, Target, Trace,
+    Problem, Real, Reduce, Report, Source, Stage, Target, Trace, Weighed,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -88,14 +88,14 @@ fn tried<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, Error> + Send
 }
 
 /// What an objective of Python gives for a run.
-fn asked(py: Python<'_>, objective: &Py<PyAny>, trace: &Trace) -> PyResult<(f64, Vec<Vec<f64>>)> {
+fn asked(py: Python<'_>, objective: &Py<PyAny>, trace: &Trace) -> PyResult<Weighed> {
     let times = PyArray1::from_slice(py, &trace.times);
     let columns: Vec<_> = trace.columns.iter().map(|c| PyArray1::from_slice(py, &c.values)).collect();
     let names: Vec<&str> = trace.columns.iter().map(|c| c.name.as_str()).collect();
     let told = objective.bind(py).call1((times, names, columns))?;
     let (value, weights): (f64, Vec<PyReadonlyArray1<'_, f64>>) = told.extract()?;
-    let weights = weights.iter().map(|w| Ok(w.to_vec()?)).collect::<PyResult<_>>()?;
-    Ok((value, weights))
+    let samples = weights.iter().map(|w| Ok(w.to_vec()?)).collect::<PyResult<_>>()?;
+    Ok(Weighed { value, samples, times: None })
 }
 
 #[pymethods]

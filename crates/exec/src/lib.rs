@@ -17,6 +17,6 @@ pub use machine::MachineError;
 pub use model::{
     Alternatives, Compiled, Drifted, Equilibrium, EquilibriumError, Evaluated, Executed, Execution, Expected,
     ImplicitMemory, ImplicitModel, InputError, Linearised, Memory, ModeId, ModeProgram, Model, Operations,
-    ParameterError, Quantity, Reason, RecordError, Setup, StartConflict, StartError, StartValue, Tape, Taped, Varied,
-    WideModel,
+    ParameterError, Quantity, Reason, RecordError, SampleWeights, Setup, StartConflict, StartError, StartValue, Tape,
+    Taped, Varied, WideModel,
 };

@@ -13,9 +13,20 @@ use crate::run::{Progress, Run, Simulated, units};
 use crate::sensitivity::By;
 use crate::sweep::{Reduce, Reduction};
 
-/// The number that is differentiated, told the run: its value, and its derivatives by what was recorded, of each column by each
-/// sample, in the units of the columns.
-pub type Objective<'a> = dyn FnMut(&Trace) -> Result<(f64, Vec<Vec<f64>>), Error> + 'a;
+/// The number that is differentiated, told the run.
+pub type Objective<'a> = dyn FnMut(&Trace) -> Result<Weighed, Error> + 'a;
+
+/// A number that a run comes to, with its derivatives by what was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weighed {
+    /// The number.
+    pub value: f64,
+    /// Its derivatives by each column at each sample, in the units of the columns.
+    pub samples: Vec<Vec<f64>>,
+    /// Its derivatives by the time of each sample, in 1/s: samples that events are taken at move with these. `None` if the number
+    /// is one of samples at times that stand still.
+    pub times: Option<Vec<f64>>,
+}
 
 /// What a gradient comes to.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,8 +85,10 @@ impl Model {
         objective: &mut Objective<'_>,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<Gradient, Error> {
+        // Samples at given times stand still.
+        let moves = run.every.is_none() && run.at.is_empty();
         let (by, options, run, taped) = self.run_taped(&mut system, run, progress)?;
-        let (value, weights) = objective(&run.trace)?;
+        let Weighed { value, samples: weights, times } = objective(&run.trace)?;
         let samples = taped.tape.samples();
         let shape = || (weights.len(), weights.iter().map(Vec::len).find(|&length| length != samples));
         let columns = run.trace.columns.len();
@@ -98,7 +111,9 @@ impl Model {
             .flat_map(|k| weights.iter().zip(&factors).map(move |(column, factor)| column[k] * factor))
             .collect();
         let method = (options.method, taped.stiff);
-        let slopes = taped.tape.gradient(&mut system, (taped.first, &rows), method, options.rtol);
+        let times = times.filter(|times| moves && times.len() == samples).unwrap_or_default();
+        let weights = exec::SampleWeights { first: taped.first, values: &rows, times: &times };
+        let slopes = taped.tape.gradient(&mut system, &weights, method, options.rtol);
         let slopes = slopes.map_err(|failure| self.stopped(failure))?;
         let slope = |(by, slope): (&By, f64)| Slope {
             name: by.name.clone(),
@@ -162,13 +177,14 @@ impl Reduce {
     ///
     /// # Errors
     /// The variable is not recorded, or the number has no derivative by values at given times.
-    pub fn objective(&self, trace: &Trace) -> Result<(f64, Vec<Vec<f64>>), Error> {
+    pub fn objective(&self, trace: &Trace) -> Result<Weighed, Error> {
         let bad = |reason: String| Error::from(Problem::BadOption { reason });
         let Some(at) = trace.columns.iter().position(|c| c.name == self.variable) else {
             return Err(bad(format!("`{}` is not recorded", self.variable)));
         };
         let (times, values) = (&trace.times, &trace.columns[at].values);
         let mut weights = vec![vec![0.0; times.len()]; trace.columns.len()];
+        let mut by_time = vec![0.0; times.len()];
         let own = &mut weights[at];
         let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
             return Err(bad("nothing was recorded".into()));
@@ -195,6 +211,9 @@ impl Reduce {
                 for (i, t) in times.windows(2).enumerate() {
                     let part = 0.5 * (t[1] - t[0]) / length;
                     mean += part * (values[i] + values[i + 1]);
+                    let slope = 0.5 * (values[i] + values[i + 1]) / length;
+                    by_time[i] -= slope;
+                    by_time[i + 1] += slope;
                     own[i] += part;
                     own[i + 1] += part;
                 }
@@ -205,11 +224,15 @@ impl Reduce {
                 for (i, t) in times.windows(2).enumerate() {
                     let (part, [a, b]) = ((t[1] - t[0]) / (3.0 * length), [values[i], values[i + 1]]);
                     square += part * (a * a + a * b + b * b);
+                    let slope = (a * a + a * b + b * b) / (3.0 * length);
+                    by_time[i] -= slope;
+                    by_time[i + 1] += slope;
                     own[i] += part * (2.0 * a + b);
                     own[i + 1] += part * (2.0 * b + a);
                 }
                 let rms = square.sqrt();
-                own.iter_mut().for_each(|w| *w *= if rms > 0.0 { 0.5 / rms } else { 0.0 });
+                let half = if rms > 0.0 { 0.5 / rms } else { 0.0 };
+                own.iter_mut().chain(&mut by_time).for_each(|w| *w *= half);
                 rms
             }
             Reduction::TimeOfMax => {
@@ -217,6 +240,6 @@ impl Reduce {
                 return Err(bad(reason.into()));
             }
         };
-        Ok((value, weights))
+        Ok(Weighed { value, samples: weights, times: Some(by_time) })
     }
 }

@@ -84,7 +84,7 @@ pub use execution::RoutineReport;
 pub use export::{CostReport, Export, ExportReport, Exported, Target};
 pub use families::Family;
 pub use fit::{Beginning, Estimate, Fit, FitParameter, FitReport, FittedRun, Loss, Profile, Sigma};
-pub use gradient::{Gradient, Objective, Slope};
+pub use gradient::{Gradient, Objective, Slope, Weighed};
 pub use halfarrow_compiler::bond_graph::NameKind;
 pub use halfarrow_compiler::bond_graph::{FileError, Files, NoFiles, Override};
 pub use halfarrow_compiler::compile::Found;

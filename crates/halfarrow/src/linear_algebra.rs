@@ -7,6 +7,8 @@ use nalgebra::linalg::balancing::balance_parlett_reinsch;
 /// A complex number: real and imaginary part.
 pub(crate) type Complex = [f64; 2];
 
+/// Entries whose squares are numbers.
+const SQUARED: std::ops::Range<f64> = 1e-100..1e100;
 /// Matrices that are tried to see what roundings do.
 const TRIALS: u32 = 3;
 
@@ -19,10 +21,14 @@ pub(crate) fn eigenvalues(rows: &[Vec<f64>]) -> Option<Vec<Complex>> {
     if rows.iter().flatten().any(|entry| !entry.is_finite()) {
         return None;
     }
-    let mut balanced = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+    // Squares that overflow would keep the library from ever ending.
+    let most = rows.iter().flatten().fold(0.0f64, |most, entry| most.max(entry.abs()));
+    let unit = if SQUARED.contains(&most) || most == 0.0 { 1.0 } else { most };
+    let mut balanced = DMatrix::from_fn(n, n, |i, j| rows[i][j] / unit);
     balance_parlett_reinsch(&mut balanced);
     let found = Mat::from_fn(n, n, |i, j| balanced[(i, j)]).eigenvalues().ok()?;
-    Some(sorted(found.into_iter().map(|z| [z.re, z.im]).collect()))
+    let found: Vec<Complex> = found.into_iter().map(|z| [z.re * unit, z.im * unit]).collect();
+    found.iter().flatten().all(|part| part.is_finite()).then(|| sorted(found))
 }
 
 /// By how much each eigenvalue is uncertain if every entry of the matrix is known to so many roundings only: the distance

@@ -1,5 +1,7 @@
 //! Equilibria of families of models, at three sizes each, against closed forms and raw equations.
 
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
 use std::collections::BTreeMap;
 
 use halfarrow::{Error, Family, Linearize, Model, Point, Problem, Record, Run, Start};
@@ -153,5 +155,43 @@ fn large_models_are_linearised_at_rest_or_refused_with_the_reason() {
         }
         Err(other) => panic!("{}", other.render(false)),
         Ok(_) => panic!("it is linearised"),
+    }
+}
+
+/// Newton's method from where a diode hardly conducts, or conducts beyond measure; rates on the way say nothing of those at its end.
+#[test]
+fn rest_is_where_rates_vanish_and_not_where_they_are_small_beside_what_they_were() {
+    let charge = |law: &str, source: &str| {
+        let text = format!("model M\n{source}\no -> C:c(1e-6)\no -> R:d({law})\n");
+        run_at_rest(&text).unwrap_or_else(|e| panic!("{}", e.render(false)))["c.q"]
+    };
+    let near =
+        |found: f64, wanted: f64| assert!((found - wanted).abs() < 1e-9 * wanted.abs(), "{found} is not {wanted}");
+    for current in [1e-6, 1e-3, 1e-2, 3.0] {
+        let diode = charge("f = 1e-12*(exp(e/0.026) - 1)", &format!("Sf:i({current}) -> 0:o"));
+        near(diode, 1e-6 * 0.026 * (current / 1e-12_f64).ln_1p());
+        let varistor = charge("f = (abs(e)/100)^30*sign(e) + 1e-12*e", &format!("Sf:i({current}) -> 0:o"));
+        let leak = 1e-12 * varistor * 1e6;
+        assert!(((varistor * 1e4).powi(30) / (current - leak) - 1.0).abs() < 1e-6, "{varistor}");
+    }
+    // A diode over which a capacitor charges.
+    let series = "model M\nSe:v(5) -> 1:l -> R:r(f = 1e-9*(exp(e/0.026) - 1))\nl -> C:c(1e-6)\n";
+    near(run_at_rest(series).unwrap_or_else(|e| panic!("{}", e.render(false)))["c.q"], 5e-6);
+    // A fan that hardly brakes at first.
+    let fan = "model M\nSe:t(10) -> 1:w -> I:j(0.01)\nw -> R:fan(e = 1e-4*f*abs(f) + 1e-9*f)\n";
+    let speed = run_at_rest(fan).unwrap_or_else(|e| panic!("{}", e.render(false)))["j.f"];
+    assert!((speed - 1e5f64.sqrt()).abs() < 1e-6 * speed, "{speed}");
+}
+
+/// Forces that vanish at infinity alone are no rest.
+#[test]
+fn infinity_is_no_rest() {
+    for law in ["e = exp(q), q0 = 0.5", "e = -1/q^2, q0 = 1", "e = 2*(1 - exp(-q))*exp(-q), q0 = 5"] {
+        let text = format!("model M\n1:v -> I:m(1)\nv -> C:s({law})\nv -> R:r(1)\n");
+        match run_at_rest(&text) {
+            Err(Error::Usage(Problem::NoEquilibrium { .. })) => {}
+            Err(other) => panic!("{}", other.render(false)),
+            Ok(found) => assert!(found["s.q"].abs() < 1e-9, "{law}: {found:?}"),
+        }
     }
 }

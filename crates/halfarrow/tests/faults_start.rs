@@ -756,3 +756,27 @@ fn rest_is_found_from_where_laws_are_flat() {
         assert!((found - wanted).abs() <= 1e-5 * wanted, "{name}: {found}, not {wanted}");
     }
 }
+
+/// What nobody asks for gives way rather than that an angle goes to where nothing is told any more: at infinity, or at so many turns
+/// that its sine is rounding.
+#[test]
+fn a_start_that_nobody_asks_for_is_not_sought_at_infinity() {
+    let gear = |ratio: &str| {
+        let text = format!(
+            "model M\n1:w -> I:i(1, f0 = 1)\nstate th' = w.f\nw -> TF:g(f_out = {ratio}) -> 1:u -> I:j(2)\noutput f = w.f\n"
+        );
+        start_of(&model(&text), Form::Minimal, Start::Given)
+    };
+    for ratio in ["1 + 0.6*sin(th)", "1 + 0.7*sin(th)", "exp(-1.84*th)", "(th + 0.3)/sqrt(1 + (th + 0.3)^2) + 1"] {
+        let start = gear(ratio);
+        assert!(start["th"] == 0.0 && (start["f"] - 1.0).abs() < 1e-12, "{ratio}: {start:?}");
+    }
+    // Where an angle at which the second mass stands still is to be had, it is taken.
+    let start = gear("1 + 2*sin(th)");
+    assert!((start["th"] + std::f64::consts::FRAC_PI_6).abs() < 1e-9, "{start:?}");
+    let two = "model M\n1:w1 -> I:i1(1, f0 = 1)\nstate t1' = w1.f\n\
+               w1 -> TF:g1(f_out = 2 + 0.187*cos(t1)) -> 1:w2 -> I:i2(1)\nstate t2' = w2.f\n\
+               w2 -> TF:g2(f_out = 2 + 1.457*sin(t2 + t1)) -> 1:w3 -> I:i3(3)\n";
+    let start = start_of(&model(two), Form::Minimal, Start::Given);
+    assert!((start["i1.f"] - 1.0).abs() < 1e-12 && start["t1"] == 0.0 && start["t2"] == 0.0, "{start:?}");
+}

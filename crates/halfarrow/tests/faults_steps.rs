@@ -37,6 +37,40 @@ fn rounding_is_no_magnitude() {
     assert!(report.steps <= 100, "{} steps", report.steps);
 }
 
+/// A law that hardly acts at the start would let a state grow by many decades until something holds it. Charge of a capacitor
+/// beside a diode or a varistor, and speed of a fan, in closed form.
+#[test]
+fn a_law_that_hardly_acts_at_the_start_tells_no_magnitude() {
+    let methods = [Method::Auto, Method::Explicit, Method::Radau, Method::Bdf];
+    let solar = "Sf:cell(3) -> 0:n\nn -> R:d(f = 1e-9*(exp(e/0.026) - 1))\nn -> C:c(1e-4)\noutput y = n.e\n";
+    let diode = |t: f64| {
+        let (part, all) = (1e-9 / (3.0 + 1e-9), 3.0 + 1e-9);
+        -0.026 * (part + (1.0 - part) * (-all * t / (1e-4 * 0.026)).exp()).ln()
+    };
+    let fan = |slope: f64| {
+        format!("Se:t(10) -> 1:w -> I:j(0.01)\nw -> R:fan(e = 1e-4*f*abs(f) + {slope:e}*f)\noutput y = w.f\n")
+    };
+    let turns = |t: f64| 1e5f64.sqrt() * (1e-3f64.sqrt() / 0.01 * t).tanh();
+    let varistor = "Sf:i(0.01) -> 0:o -> C:c(1e-6)\n\
+                    o -> R:v(f = (abs(e)/100)^30*sign(e) + 1e-12*e)\noutput y = o.e\n";
+    let held = 100.0 * 0.01f64.powf(1.0 / 30.0);
+    for method in methods {
+        let end = |text: &str, to: f64| {
+            let done = run(&self::text(&format!("model M\n{text}")), Run { to, method, rtol: 1e-8, ..Run::default() });
+            assert_eq!(done.report.audit.verdict, Verdict::Holds, "{method:?}\n{text}");
+            *done.trace.columns.last().expect("an output").values.last().expect("an end")
+        };
+        let near = |found: f64, wanted: f64| {
+            assert!((found - wanted).abs() < 2e-6 * wanted, "{method:?}: {found} is not {wanted}");
+        };
+        near(end(solar, 1.5e-5), diode(1.5e-5));
+        near(end(solar, 1e-3), diode(1e-3));
+        near(end(&fan(1e-9), 0.3), turns(0.3));
+        near(end(&fan(1e-12), 2.0), turns(2.0));
+        near(end(varistor, 0.05), held);
+    }
+}
+
 /// What runs down a chain comes to its end as a ripple of some decades below, and rounding with it.
 /// Where a machine would rest tells how great its states are only if it is near. The reference is the same machine by classical
 /// Runge-Kutta with steps of 1e-4 s.

@@ -1,8 +1,10 @@
 //! Gradients from runs followed backwards: against the same run differentiated forwards, of every model, by every method,
 //! through every kind of event; against closed forms; what has no derivative is refused.
 
+#![allow(clippy::disallowed_methods, reason = "values to compare with")]
+
 use super::sensitivity::{BALL, BELT, CAR, SAMPLED, collection, model, run};
-use halfarrow::{Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Start, Trace};
+use halfarrow::{Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Start, Trace, Weighed};
 
 /// Numbers between -1 and 1.
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
@@ -30,8 +32,12 @@ fn weigh(trace: &Trace) -> (f64, Vec<Vec<f64>>) {
     (value, weights)
 }
 
+fn weighed((value, samples): (f64, Vec<Vec<f64>>)) -> Weighed {
+    Weighed { value, samples, times: None }
+}
+
 fn gradient(model: &Model, run: &Run) -> Result<Gradient, Error> {
-    model.gradient(run, &mut |trace| Ok(weigh(trace)), &mut |_| true)
+    model.gradient(run, &mut |trace| Ok(weighed(weigh(trace))), &mut |_| true)
 }
 
 /// The greatest difference between the way back and the way forth, of the terms that a derivative is the sum of.
@@ -193,7 +199,7 @@ fn reductions_are_those_of_sweeps() {
                 compiled.set(name, value).expect("a value");
                 let run = Run { sensitivities: Vec::new(), rtol: 1e-12, ..asked.clone() };
                 let trace = compiled.simulate(&run, &mut |_| true).expect("a run").trace;
-                wanted.objective(&trace).expect("a number").0
+                wanted.objective(&trace).expect("a number").value
             };
             let difference = (beside(value + 1e-4) - beside(value - 1e-4)) / 2e-4;
             assert!((slope.slope - difference).abs() < 1e-6, "{kind} by {name}: {} for {difference}", slope.slope);
@@ -203,6 +209,48 @@ fn reductions_are_those_of_sweeps() {
     let asked = Run { record: Record::Names(vec!["mass.f".into()]), ..run(&by, 1.0) };
     let error = drop.gradient(&asked, &mut |trace| wanted.objective(trace), &mut |_| true).expect_err("no derivative");
     assert!(error.to_string().contains("time_of_max has no derivative"), "{error}");
+}
+
+/// Samples that events are taken at move with these: a capacitor is fullest where a pulse ends, a room warmest where its heater is
+/// switched off, a ball fastest where it meets the ground. Derivatives in closed form.
+#[test]
+fn numbers_follow_the_instants_of_events() {
+    let pulse = "model M\nparam T1 = 0.5, A = 2\nSe:s(if t < T1 then A else 0) -> 1:l -> R:r(1)\nl -> C:c(1)\n\
+                 output v = c.e, i = r.f, u = s.e\n";
+    let room = "model M\nparam P = 120, hi = 24, lo = 21\ndiscrete on = 1\nSf:h(P*on) -> 0:room\n\
+                room -> C:w(c = 900, e0 = 20)\nroom -> R:r(0.3)\nwhen w.e > hi { on = 0 }\nwhen w.e < lo { on = 1 }\n\
+                output T = w.e\n";
+    let ball = "model M\nparam g = 9.81, h0 = 1\nSe:w(-g) -> 1:v -> I:m(1)\nstate h' = v.f from h0\n\
+                when h < 0 { reset m.f = -0.5*m.f }\noutput f = v.f, height = h\n";
+    let (left, speed) = ((-0.5_f64).exp(), (2.0 * 9.81_f64).sqrt());
+    for (text, to, number, by, wanted) in [
+        (pulse, 1.0, "max(v)", ["T1", "A"], [2.0 * left, 1.0 - left]),
+        (pulse, 1.0, "min(i)", ["T1", "A"], [-2.0 * left, left - 1.0]),
+        (pulse, 1.0, "mean(u)", ["T1", "A"], [2.0, 0.5]),
+        (pulse, 1.0, "rms(u)", ["T1", "A"], [2.0_f64.sqrt(), 0.5_f64.sqrt()]),
+        (room, 100.0, "max(T)", ["hi", "P"], [1.0, 0.0]),
+        (ball, 1.0, "max_abs(f)", ["g", "h0"], [0.5 * speed / 9.81, 0.5 * speed]),
+        (ball, 1.0, "min(height)", ["g", "h0"], [0.0, 0.0]),
+    ] {
+        let wanted_of = Reduce::parse(number).expect("a reduction");
+        for (method, step) in [(Method::Auto, None), (Method::Bdf, None), (Method::Fixed(FixedMethod::Rk4), Some(0.01))]
+        {
+            let variable = number.split(['(', ')']).nth(1).expect("a variable");
+            let record = Record::Names(vec![variable.into()]);
+            let asked = Run { method, step, record, rtol: 1e-9, every: None, ..run(&by, to) };
+            let found = model(text).gradient(&asked, &mut |trace| wanted_of.objective(trace), &mut |_| true);
+            let found = found.unwrap_or_else(|error| panic!("{number} by {method:?}: {error}"));
+            for (slope, wanted) in found.slopes.iter().zip(wanted) {
+                let missed = (slope.slope - wanted).abs();
+                assert!(
+                    missed < 1e-5 * speed,
+                    "{number} by {} with {method:?}: {} for {wanted}",
+                    slope.name,
+                    slope.slope
+                );
+            }
+        }
+    }
 }
 
 #[test]
@@ -228,7 +276,8 @@ fn what_has_no_derivative_is_refused() {
     assert!(refusal(plain, &rosenbrock).contains("second derivatives"));
     let pad = "model S\nparam v = 1, fc = 2\n1:j -> I:m(1, f0 = v)\nj -> R:pad(friction = fc)\n";
     assert!(refusal(pad, &run(&["v"], 2.0)).contains("another branch"));
-    let short = model(plain).gradient(&run(&["mass"], 1.0), &mut |_| Ok((0.0, vec![vec![1.0]])), &mut |_| true);
+    let short =
+        model(plain).gradient(&run(&["mass"], 1.0), &mut |_| Ok(weighed((0.0, vec![vec![1.0]]))), &mut |_| true);
     let short = short.expect_err("too few").to_string();
     assert!(short.contains("1 columns of 9 samples, not 1 of 1"), "{short}");
 }

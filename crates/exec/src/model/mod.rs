@@ -44,7 +44,7 @@ pub use memory::Memory;
 pub use modes::ModeProgram;
 pub use operations::Operations;
 pub use projection::Drifted;
-pub use sensitivity::{Quantity, Tape, Taped, Varied};
+pub use sensitivity::{Quantity, SampleWeights, Tape, Taped, Varied};
 pub use setup::Setup;
 pub use wide::WideModel;
 

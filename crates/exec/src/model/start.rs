@@ -30,6 +30,14 @@ const NOISE: f64 = 1e-14;
 const ROUNDED: f64 = 1e-12;
 /// Largest trusted ratio of an extrapolated to a given magnitude: beyond it lie directions with next to no stiffness.
 const FAR: f64 = 1e3;
+/// Beyond so many times what is asked for, or 1, no start value is meant.
+const BEYOND: f64 = 1e12;
+/// A condition that nobody asks for counts no more where its derivatives are below this part of what they were.
+const LOST_FROM_SIGHT: f64 = 1e-9;
+/// How many times what derivatives make of them at most rates may be for equations to be about linear.
+const UNLIKE: f64 = 10.0;
+/// Halvings of the way to the equilibrium of linearised equations: exponential laws are far from linear all along.
+const HALVINGS: usize = 100;
 /// Models with more states are not linearised to estimate typical magnitudes.
 const MOST_LINEARISED: usize = 200;
 
@@ -160,7 +168,8 @@ impl Model {
     ///
     /// The equilibrium is sought along directions that the junction structure allows: a displacement that depends on others,
     /// moved alone, would change no rate by more than rounding error. Neither would a state that acts on a rate by rounding
-    /// alone: a rate that no state brings to 0 has no equilibrium.
+    /// alone: a rate that no state brings to 0 has no equilibrium. Nor does the way to it count further than equations are
+    /// about as they are here: a diode that hardly conducts at the start would have its capacitor charged to a million volts.
     pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
@@ -169,22 +178,55 @@ impl Model {
         }
         let Ok((rates, mut jacobian)) = self.at_rest(t, x) else { return sizes };
         let Some(directions) = self.first_directions(t, x) else { return sizes };
-        let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
-        let fastest =
-            (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)));
+        let fastest = greatest_pair(&jacobian, n);
         let reaches = reaches(&jacobian, &rates, &sizes, fastest);
         silence(&mut jacobian, &rates, &reaches);
         let Some(way) = minimum_norm::step(&directions.along(&jacobian, n), &rates, directions.count(n)) else {
             return sizes;
         };
-        let step = directions.step(&way.step);
+        let mut step = directions.step(&way.step);
+        let pulls: Vec<f64> =
+            (0..n).map(|i| (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum::<f64>()).collect();
+        let mut fastest = fastest;
+        if let Some((part, there)) = self.clone().about_linear(t, x, &step, &rates, &pulls) {
+            step.iter_mut().for_each(|step| *step *= part);
+            fastest = fastest.max(greatest_pair(&there, n));
+        }
         for (i, size) in sizes.iter_mut().enumerate() {
-            let pull: f64 = (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum();
-            let soon = if fastest > 0.0 { pull.max(rates[i].abs()) / fastest } else { 0.0 };
+            let soon = if fastest > 0.0 { pulls[i].max(rates[i].abs()) / fastest } else { 0.0 };
             let near = size.max(soon);
             *size = near.max(step[i].abs().min(FAR * near));
         }
         sizes
+    }
+
+    /// Which part of a step can be gone before the rates are far from what their derivatives make of them, and the derivatives
+    /// there; `None` if that is all of it, or if it cannot be told.
+    pub(super) fn about_linear(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        step: &[f64],
+        rates: &[f64],
+        pulls: &[f64],
+    ) -> Option<(f64, Vec<f64>)> {
+        let mut part = 1.0;
+        for _ in 0..HALVINGS {
+            let there: Vec<f64> = x.iter().zip(step).map(|(x, step)| x + part * step).collect();
+            match self.rates_at(t, &there) {
+                Ok(()) => {
+                    let far = |(i, rate): (usize, &f64)| rate.abs() > UNLIKE * (rates[i].abs() + part * pulls[i]);
+                    if !self.dx.iter().enumerate().any(far) {
+                        return if part < 1.0 { Some((part, self.at_rest(t, &there).ok()?.1)) } else { None };
+                    }
+                }
+                // Where a loop cannot be closed nothing is known of laws.
+                Err(_) if !self.code.program.positions.is_empty() => return None,
+                Err(_) => {}
+            }
+            part *= 0.5;
+        }
+        None
     }
 
     /// Solves the conditions that have one open unknown for it, all of one pass at once.
@@ -216,6 +258,7 @@ impl Model {
         let mut best: Vec<(f64, f64)> = targets.iter().map(|&u| (f64::INFINITY, unknowns.z[u])).collect();
         let mut step = vec![0.0; targets.len()];
         let mut done = vec![false; targets.len()];
+        let mut slopes: Vec<Option<[f64; 2]>> = vec![None; targets.len()];
         for _ in 0..ITERATIONS {
             if self.residuals(t, &routine, &unknowns.z, Some(&targets)).is_err() {
                 break;
@@ -226,7 +269,9 @@ impl Model {
                     continue;
                 }
                 let z = &mut unknowns.z[unknown];
+                let [_, last] = slopes[i].get_or_insert([slope; 2]);
                 if residual.abs() < best[i].0 {
+                    *last = slope;
                     best[i] = (residual.abs(), *z);
                     step[i] = -residual / slope;
                 } else {
@@ -238,6 +283,11 @@ impl Model {
             if done.iter().all(|&done| done) {
                 break;
             }
+        }
+        for (i, &condition) in chosen.values().enumerate() {
+            let slopes = slopes[i].unwrap_or_default().map(f64::abs);
+            let is_lost = self.code.program.start[condition].weak && slopes[1] < LOST_FROM_SIGHT * slopes[0];
+            done[i] &= !is_lost && best[i].1.abs() <= BEYOND * begin[i].abs().max(1.0);
         }
         for (((&unknown, &condition), &done), begin) in targets.iter().zip(chosen.values()).zip(&done).zip(begin) {
             unknowns.known[unknown] = done;
@@ -380,6 +430,8 @@ impl Model {
         let searched = self.names_of(group.unknowns.iter().zip(&open).filter(|(_, open)| **open).map(|(&u, _)| u));
         let at_time = GroupAtTime { t, routine, group };
         // Known unknowns stay if the conditions can be met so; in the second round all may change.
+        // What conditions tell where nothing has been tried yet.
+        let told = self.linearised(t, routine, group, &all.z).map(|at| at.1);
         let mut first = None;
         let all_open = vec![true; open.len()];
         let rounds = if open.contains(&true) { vec![open.clone(), all_open] } else { vec![all_open] };
@@ -393,14 +445,17 @@ impl Model {
                     z[u] += if all.guessed[u] && first_guess.abs() > BESIDE { 0.0 } else { offset(j) };
                 }
                 if let Some(at) = self.linearised(t, routine, group, &z) {
+                    let before = told.clone().unwrap_or_else(|| at.1.clone());
                     let (z, residual, jacobian) = self.nearest(at_time, z, at, &movable);
-                    if self.unmet((group, routine), &z, &residual, &jacobian).is_empty() {
+                    if self.unmet((group, routine), &z, &residual, &jacobian).is_empty()
+                        && !self.has_run_away(group, &z, [&before, &jacobian])
+                    {
                         all.z = z;
                         group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
                         return Ok(());
                     }
                     if movable.iter().all(|m| *m) {
-                        first.get_or_insert((z, residual, jacobian));
+                        first.get_or_insert((z, residual, jacobian, before));
                     }
                 }
                 // Without an open unknown all first guesses are alike.
@@ -409,7 +464,7 @@ impl Model {
                 }
             }
         }
-        let Some((mut z, mut residual, mut jacobian)) = first else {
+        let Some((mut z, mut residual, mut jacobian, before)) = first else {
             let run = self.residuals(t, routine, &all.z, None);
             return Err(StartError::Failure(run.err().unwrap_or_else(|| self.explain(t).unwrap_or(without_value))));
         };
@@ -423,7 +478,9 @@ impl Model {
                 break;
             }
         }
-        if self.unmet((group, routine), &z, &residual, &jacobian).is_empty() {
+        if self.unmet((group, routine), &z, &residual, &jacobian).is_empty()
+            && !self.has_run_away(group, &z, [&before, &jacobian])
+        {
             all.z = z;
             group.unknowns.iter().for_each(|&u| all.known[u as usize] = true);
             return Ok(());
@@ -432,6 +489,21 @@ impl Model {
             Some(values) => StartError::Conflict(StartConflict { values, searched }),
             None => StartError::NotFound { conditions: names, searched },
         })
+    }
+
+    /// Whether a search has gone to where conditions hold because nothing is told there any more: a ratio that comes to 0 at
+    /// infinity alone, an angle of so many turns that its sine is rounding. `jacobians`: where it began, and where it has ended.
+    fn has_run_away(&self, group: &StartGroup, z: &[f64], jacobians: [&[f64]; 2]) -> bool {
+        let n = group.unknowns.len();
+        let start = &self.code.program.start;
+        let asked = group.conditions.iter().filter_map(|&c| self.code.layout.registers.get(&start[c].asked));
+        let most = asked.fold(1.0f64, |most, &register| most.max(self.frame.r[register as usize].abs()));
+        let is_beyond = group.unknowns.iter().any(|&u| z[u as usize].abs() > BEYOND * most);
+        let greatest = |jacobian: &[f64], i: usize| jacobian[i * n..][..n].iter().fold(0.0f64, |m, j| m.max(j.abs()));
+        let is_lost = |(i, &c): (usize, &usize)| {
+            start[c].weak && greatest(jacobians[1], i) < LOST_FROM_SIGHT * greatest(jacobians[0], i)
+        };
+        is_beyond || group.conditions.iter().enumerate().any(is_lost)
     }
 
     /// The names of unknowns: states, then conserved constants, then positions.
@@ -648,6 +720,12 @@ impl Model {
         self.frame.reserve(&routine);
         routine
     }
+}
+
+/// The greatest rate, in 1/s, at which a state moves by itself or two move each other.
+fn greatest_pair(jacobian: &[f64], n: usize) -> f64 {
+    let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+    (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)))
 }
 
 /// How far each state is from 0, or soon will be: what its rate makes of it in the shortest time, and where that is 0 as well

@@ -143,7 +143,7 @@ impl Model {
     fn rests_at(&mut self, jacobian: &mut Jacobian, leaf: Option<&Leaf>, t: f64, x: &[f64]) -> bool {
         let Ok(inert) = self.inert(jacobian, t, x) else { return false };
         let Ok(at) = self.point(jacobian, (leaf, &inert), t, x.to_vec()) else { return false };
-        let mut rest = Rest::new(at.x.len());
+        let mut rest = Rest::new(x);
         rest.see(&at);
         rest.is_reached(&at)
     }
@@ -165,10 +165,37 @@ impl Model {
             Err(refused) => refused,
             found => return found,
         };
+        if let Some(found) = self.settle_from_where_laws_bend(&mut jacobian, within, t, x) {
+            return Ok(found);
+        }
         let released = self.release_loads(within, t, x);
         let settled = released.and_then(|near| self.settle(&mut jacobian, within, t, &near).ok());
         let found = settled.and_then(|found| self.audited(leaf, t, found).ok());
         found.or_else(|| self.settle_away(&mut jacobian, within, t, x)).ok_or(refused)
+    }
+
+    /// A search from the end of what is about linear on the way to the equilibrium of the linearised equations: behind it a diode
+    /// conducts that hardly did, and from there it is told well.
+    fn settle_from_where_laws_bend(
+        &mut self,
+        jacobian: &mut Jacobian,
+        within: (Option<&Leaf>, &[bool]),
+        t: f64,
+        x: &[f64],
+    ) -> Option<Equilibrium> {
+        if within.0.is_some() {
+            return None;
+        }
+        let at = self.point(jacobian, within, t, x.to_vec()).ok()?;
+        let step = at.newton_step(true)?.step;
+        let mut pulls = vec![0.0f64; x.len()];
+        at.entries().for_each(|(i, j, v)| pulls[i] += (v * step[j]).abs());
+        let (part, _) = self.clone().about_linear(t, x, &step, &at.rates, &pulls)?;
+        let step: Vec<f64> = step.iter().map(|step| part * step).collect();
+        let there = self.moved(within.0, t, x, &step)?;
+        let inert = self.inert(jacobian, t, &there).ok()?;
+        let settled = self.settle(jacobian, (within.0, &inert), t, &there).ok();
+        settled.and_then(|found| self.audited(within.0, t, found).ok())
     }
 
     /// From where laws are flat, or infinitely steep, a slope says nothing of what is further on: a pipe in which nothing flows, a
@@ -223,7 +250,7 @@ impl Model {
     ) -> Result<Equilibrium, EquilibriumError> {
         let mut pseudo_step = f64::INFINITY;
         let mut least: Option<LeastRates> = None;
-        let mut rest = Rest::new(x.len());
+        let mut rest = Rest::new(x);
         // Where steps as the motion goes have ended.
         let mut stuck: Option<LinearisedPoint> = None;
         let mut at = self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
@@ -234,11 +261,14 @@ impl Model {
             let weights = bounded_weights(&newton.weights, leaf, &at);
             let first = || LeastRates { weights: weights.clone(), least: f64::INFINITY, moving: Vec::new() };
             least.get_or_insert_with(first).update(&at.rates, &rest);
-            if newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs()) || rest.is_exact(&at) {
-                if rest.is_reached(&at) {
+            let stands = newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs());
+            // Along a leaf rates vanish with the relations that it keeps, and steps are those of positions that turn.
+            let reached = rest.is_reached(&at) && (leaf.is_some() || rest.is_near(&at, &newton.step));
+            if stands || rest.is_exact(&at) {
+                if reached {
                     return Ok(found());
                 }
-                if pseudo_step.is_infinite() {
+                if stands && pseudo_step.is_infinite() {
                     break;
                 }
             }
@@ -272,7 +302,7 @@ impl Model {
                     at = next;
                 }
                 // No step comes nearer, since only rounding is left.
-                None if rest.is_reached(&at) => return Ok(found()),
+                None if reached => return Ok(found()),
                 // Steps as the motion goes end where nothing can be done: the shortest ones, then.
                 None if pseudo_step.is_infinite() && stuck.is_none() && newton.free > 0 && x.len() <= FEW_STATES => {
                     let start =

@@ -56,7 +56,8 @@ impl LinearisedPoint {
     /// The fastest rate of a state by itself, or at which two states exchange what they hold.
     pub fn fastest_pair(&self) -> f64 {
         let place = |i: usize, j: usize| self.jacobian.binary_search_by_key(&(j, i), |e| (e.1, e.0));
-        let turned = |&(i, j, v): &Entry| place(j, i).map_or(0.0, |at| (v * self.jacobian[at].2).abs().sqrt());
+        let turned =
+            |&(i, j, v): &Entry| place(j, i).map_or(0.0, |at| v.abs().sqrt() * self.jacobian[at].2.abs().sqrt());
         self.jacobian.iter().map(turned).fold(0.0f64, f64::max)
     }
 

@@ -4,6 +4,8 @@ use super::point::{LOST, LinearisedPoint};
 
 /// Rates below this fraction of their own terms count as zero.
 const AT_REST: f64 = 1e-9;
+/// Steps below this fraction of what they are steps of lead no further.
+const NEAR: f64 = 1e-7;
 /// Rates below this fraction of the greatest terms of what they are joined to are rounding: normwise backward error. Source:
 /// [Higham], chapter 7.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -16,11 +18,21 @@ pub(super) struct Rest {
     joined: Vec<f64>,
     /// The fastest rate of the model, in 1/s.
     fastest: f64,
+    /// Where the search began, and the rates there.
+    start: Vec<f64>,
+    first: Vec<f64>,
 }
 
 impl Rest {
-    pub fn new(states: usize) -> Rest {
-        Rest { terms: vec![0.0; states], joined: vec![0.0; states], fastest: 0.0 }
+    /// Of a search that begins at `x`.
+    pub fn new(x: &[f64]) -> Rest {
+        Rest {
+            terms: vec![0.0; x.len()],
+            joined: vec![0.0; x.len()],
+            fastest: 0.0,
+            start: x.to_vec(),
+            first: Vec::new(),
+        }
     }
 
     /// Takes a point of the search into account.
@@ -32,6 +44,9 @@ impl Rest {
         at.entries().filter(|&(i, _, v)| counts(i, v)).for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
         for ((most, own), rate) in self.terms.iter_mut().zip(terms).zip(&at.rates) {
             *most = most.max(rate.abs()).max(own);
+        }
+        if self.first.is_empty() {
+            self.first.clone_from(&at.rates);
         }
         self.fastest = at.fastest_pair();
         self.joined = joined(at, &weights);
@@ -45,6 +60,57 @@ impl Rest {
     /// Whether all rates are as good as zero.
     pub fn is_reached(&self, at: &LinearisedPoint) -> bool {
         (0..at.x.len()).all(|i| !self.moves(i, at.rates[i]) || self.is_idle(at, i, 1e-13))
+    }
+
+    /// Whether a step leads hardly further, beside where the search stands and where it began. Rates tell that by themselves
+    /// only where they have been about linear: those of a diode are small beside what they were long before they vanish, and
+    /// those of bodies far apart get less and less.
+    pub fn is_near(&self, at: &LinearisedPoint, step: &[f64]) -> bool {
+        // Rates that vanish beside what they add up where the search stands need no word of where it has been.
+        let mut here = Rest::new(&self.start);
+        here.see(at);
+        if here.is_reached(at) {
+            return true;
+        }
+        let size = |i: usize| at.x[i].abs().max(self.start[i].abs());
+        let columns = at.weights().1;
+        let mut component = components(at);
+        let mut greatest = vec![0.0f64; step.len()];
+        for (i, column) in columns.iter().enumerate() {
+            let own = root(&mut component, i);
+            greatest[own] = greatest[own].max(size(i) / column);
+        }
+        let alone = self.steps_alone(at);
+        (0..step.len()).all(|i| {
+            let joined = columns[i] * greatest[root(&mut component, i)];
+            let own = if size(i) > 0.0 { size(i) } else { joined };
+            step[i].abs() <= NEAR * size(i).max(joined) && alone[i] <= NEAR * own
+        })
+    }
+
+    /// How far each state by itself is from where the rate vanishes that it changes most, as far as that rate is more than rounding:
+    /// a step that rates hardly tell any more is none of those that solve for all of them.
+    fn steps_alone(&self, at: &LinearisedPoint) -> Vec<f64> {
+        let n = at.x.len();
+        let rows = at.weights().0;
+        let (mut most, mut alone, mut terms) = (vec![0.0f64; n], vec![0.0f64; n], vec![0.0f64; n]);
+        let mut told = vec![false; n];
+        at.entries().for_each(|(i, j, v)| terms[i] += (v * at.x[j]).abs());
+        for (i, j, v) in at.entries().filter(|e| e.2 != 0.0) {
+            told[i] = true;
+            let weight = (rows[i] * v).abs();
+            if weight > most[j] {
+                let counts = at.rates[i].abs() > LOST * terms[i];
+                (most[j], alone[j]) = (weight, if counts { (at.rates[i] / v).abs() } else { 0.0 });
+            }
+        }
+        for (i, rate) in at.rates.iter().enumerate() {
+            // What moves as at the beginning, whatever the states are.
+            if !told[i] && rate.abs() > AT_REST * self.first[i].abs() && !self.is_idle(at, i, 1e-13) {
+                alone[i] = f64::INFINITY;
+            }
+        }
+        alone
     }
 
     /// Whether a rate changes nothing in the shortest time that the model knows.
@@ -69,11 +135,7 @@ impl Rest {
 /// What the terms of each rate would add up to, were all states that are joined by rates as great as the greatest of them,
 /// where each counts by what it does to rates.
 fn joined(at: &LinearisedPoint, (rows, columns): &(Vec<f64>, Vec<f64>)) -> Vec<f64> {
-    let mut component: Vec<usize> = (0..at.x.len()).collect();
-    at.entries().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| {
-        let (a, b) = (root(&mut component, i), root(&mut component, j));
-        component[a.max(b)] = a.min(b);
-    });
+    let mut component = components(at);
     let mut greatest = vec![0.0f64; at.x.len()];
     for (i, x) in at.x.iter().enumerate() {
         let own = root(&mut component, i);
@@ -83,6 +145,16 @@ fn joined(at: &LinearisedPoint, (rows, columns): &(Vec<f64>, Vec<f64>)) -> Vec<f
     at.entries().for_each(|(i, j, v)| joined[i] += (rows[i] * v * columns[j]).abs());
     let scaled = |(i, sum): (usize, f64)| sum / rows[i] * greatest[root(&mut component, i)];
     joined.into_iter().enumerate().map(scaled).collect()
+}
+
+/// States joined by rates, see [`root`].
+fn components(at: &LinearisedPoint) -> Vec<usize> {
+    let mut component: Vec<usize> = (0..at.x.len()).collect();
+    at.entries().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| {
+        let (a, b) = (root(&mut component, i), root(&mut component, j));
+        component[a.max(b)] = a.min(b);
+    });
+    component
 }
 
 /// The least state that is joined to this one.

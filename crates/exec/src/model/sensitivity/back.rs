@@ -15,6 +15,25 @@ const NEIGHBOURS: usize = 6;
 /// Ends of steps kept, of those gone back through last.
 const KEPT: usize = 16;
 
+/// What samples weigh.
+#[derive(Debug, Clone, Copy)]
+pub struct SampleWeights<'w> {
+    /// The first recorded value that has a weight.
+    pub first: usize,
+    /// Row by row those of the values of a sample.
+    pub values: &'w [f64],
+    /// Those of the times of samples that move with events; empty if no sample moves.
+    pub times: &'w [f64],
+}
+
+impl SampleWeights<'_> {
+    /// Those of the values of a sample, by its number among so many.
+    fn of(&self, sample: usize, samples: usize) -> &[f64] {
+        let each = self.values.len() / samples.max(1);
+        &self.values[sample * each..][..each]
+    }
+}
+
 impl Tape {
     /// The number of samples.
     pub fn samples(&self) -> usize {
@@ -22,22 +41,23 @@ impl Tape {
     }
 
     /// The derivatives, by each quantity that the model is varied by, of the sum of all recorded values from `first` on, each
-    /// times its weight: row by row those of a sample. The run was made by the `method`; one of variable step is followed back
-    /// to the relative error `rtol`, and its states have no rates to build on where it is `stiff`.
+    /// times its weight: row by row those of a sample; and of the times of samples that events were taken at, which move with
+    /// these, each times its own, where there are any. The run was made by the `method`; one of variable step is followed
+    /// back to the relative error `rtol`, and its states have no rates to build on where it is `stiff`.
     ///
     /// # Errors
     /// There is no derivative somewhere, or what the model reports.
     pub fn gradient(
         &self,
         model: &mut Model,
-        (first, weights): (usize, &[f64]),
+        weights: &SampleWeights<'_>,
         (method, stiff): (Method, bool),
         rtol: f64,
     ) -> Result<Vec<f64>, Failure> {
         let start = self.start.as_ref().expect("the run has begun");
         let kept = model.variation.take();
         let mut back = Back::new(model, self, stiff);
-        let found = back.follow((first, weights), method, rtol);
+        let found = back.follow(weights, method, rtol);
         let gathered = std::mem::take(&mut back.gathered);
         let (states, direct) = (std::mem::take(&mut back.weights_of_states), std::mem::take(&mut back.direct));
         model.variation = kept;
@@ -150,9 +170,9 @@ impl<'m> Back<'m> {
         }
     }
 
-    fn follow(&mut self, (first, weights): (usize, &[f64]), method: Method, rtol: f64) -> Result<(), Failure> {
+    fn follow(&mut self, weights: &SampleWeights<'_>, method: Method, rtol: f64) -> Result<(), Failure> {
         let mut states = std::mem::take(&mut self.weights_of_states);
-        let found = self.follow_to_start((first, weights), (method, rtol), &mut states);
+        let found = self.follow_to_start(weights, (method, rtol), &mut states);
         self.weights_of_states = states;
         found
     }
@@ -160,13 +180,12 @@ impl<'m> Back<'m> {
     /// From the end of the run to its start.
     fn follow_to_start(
         &mut self,
-        (first, weights): (usize, &[f64]),
+        weights: &SampleWeights<'_>,
         (method, rtol): (Method, f64),
         states: &mut [f64],
     ) -> Result<(), Failure> {
         let tape = self.tape;
-        let each = weights.len() / tape.samples.len().max(1);
-        let mut samples = tape.samples.iter().zip(weights.chunks(each.max(1))).rev().peekable();
+        let mut samples = (0..tape.samples.len()).rev().peekable();
         let mut steps = match method {
             Method::Fixed(method) => Some(StepBack::new(method, self.model.sparsity())),
             _ => None,
@@ -177,27 +196,29 @@ impl<'m> Back<'m> {
             if self.smooth.start > k {
                 self.smooth = self.around(k);
             }
+            let instant = self.weight_of_instant(k, weights)?;
             // What is sampled where the run stands.
-            while let Some((sample, weights)) = samples.next_if(|(s, _)| s.after == k && s.inside.is_none()) {
-                self.weigh_sample(sample, (first, weights), states)?;
+            let stands = |sample: &Sample| sample.after == k && sample.inside.is_none();
+            while let Some(sample) = samples.next_if(|&s| stands(&tape.samples[s])) {
+                self.weigh_sample(sample, weights, states)?;
             }
             match (&point.from, &mut steps) {
                 (From::Start, _) => return Ok(()),
                 (From::Switch, _) => {}
-                (From::Event(moves), _) => self.back_through_event(moves, states),
+                (From::Event(moves), _) => self.back_through_event(moves, instant, states),
                 (From::Step, Some(steps)) => self.back_over_step(steps, k, states)?,
                 (From::Step, None) => {
                     // As far as nothing is sampled and nothing happens.
                     let mut to = k - 1;
-                    let due = samples.peek().map_or(0, |(s, _)| s.after);
+                    let due = samples.peek().map_or(0, |&s| tape.samples[s].after);
                     while to > due && matches!(tape.points[to].from, From::Step) {
                         to -= 1;
                     }
                     let mut t = point.t;
-                    while let Some((sample, weights)) = samples.next_if(|(s, _)| s.after == k) {
-                        self.along((t, sample.t), (method, rtol), states)?;
-                        self.weigh_sample(sample, (first, weights), states)?;
-                        t = sample.t;
+                    while let Some(sample) = samples.next_if(|&s| tape.samples[s].after == k) {
+                        self.along((t, tape.samples[sample].t), (method, rtol), states)?;
+                        self.weigh_sample(sample, weights, states)?;
+                        t = tape.samples[sample].t;
                     }
                     self.along((t, tape.points[to].t), (method, rtol), states)?;
                     k = to + 1;
@@ -222,13 +243,56 @@ impl<'m> Back<'m> {
         }
     }
 
+    /// What the instant of an event weighs, by which the run came to a point: by the times of the samples before and behind it, and
+    /// by the values that these have then, which follow the run. Derivatives of values are those at times that stand still.
+    fn weight_of_instant(&mut self, k: usize, weights: &SampleWeights<'_>) -> Result<f64, Failure> {
+        let (points, samples) = (&self.tape.points, &self.tape.samples);
+        if weights.times.is_empty() || !matches!(points[k].from, From::Event(_)) {
+            return Ok(0.0);
+        }
+        let t = points[k].t;
+        // What stands between two events of one instant goes with the first.
+        let first = matches!(points[k - 1].from, From::Event(_)) && points[k - 1].t == t;
+        let there = |s: &Sample| s.t == t && s.inside.is_none() && (s.after == k || s.after == k - 1 && !first);
+        let near = samples.partition_point(|s| s.after + 1 < k)..samples.partition_point(|s| s.after <= k);
+        let mut weight = 0.0;
+        for number in near {
+            let sample = &samples[number];
+            if !there(sample) {
+                continue;
+            }
+            weight += weights.times[number] + self.drift(sample, (weights.first, weights.of(number, samples.len())))?;
+        }
+        Ok(weight)
+    }
+
+    /// How the weighted sum of the values of a sample moves in time.
+    fn drift(&mut self, sample: &Sample, (first, weights): (usize, &[f64])) -> Result<f64, Failure> {
+        if weights.iter().all(|&weight| weight == 0.0) {
+            return Ok(0.0);
+        }
+        let x = &self.tape.points[sample.after].x;
+        self.remember(sample.after);
+        let mut rates = vec![0.0; x.len()];
+        self.model.rates(sample.t, x, &mut rates)?;
+        self.model.place(sample.t, x);
+        self.model.still();
+        self.model.let_time_pass(sample.t);
+        let Model { frame, recorded, code, .. } = &mut *self.model;
+        frame.d[code.layout.states as usize..][..rates.len()].copy_from_slice(&rates);
+        frame.begin(None);
+        let run = frame.run_along(&recorded.routine);
+        let slopes = recorded.routine.outputs[first..].iter().map(|&output| frame.d[output as usize]);
+        let sum = slopes.zip(weights).filter(|(_, weight)| **weight != 0.0).map(|(slope, weight)| slope * weight).sum();
+        self.model.rated = None;
+        run.map_err(|error| self.model.failure(sample.t, error))?;
+        Ok(sum)
+    }
+
     /// What the samples of recorded values weigh.
-    fn weigh_sample(
-        &mut self,
-        sample: &Sample,
-        (first, weights): (usize, &[f64]),
-        states: &mut [f64],
-    ) -> Result<(), Failure> {
+    fn weigh_sample(&mut self, number: usize, all: &SampleWeights<'_>, states: &mut [f64]) -> Result<(), Failure> {
+        let (sample, first) = (&self.tape.samples[number], all.first);
+        let weights = all.of(number, self.tape.samples.len());
         if weights.iter().all(|&weight| weight == 0.0) {
             return Ok(());
         }
@@ -246,7 +310,7 @@ impl<'m> Back<'m> {
         finite(self.model, sample.t, states)
     }
 
-    fn back_through_event(&mut self, moves: &[Vec<f64>], states: &mut [f64]) {
+    fn back_through_event(&mut self, moves: &[Vec<f64>], instant: f64, states: &mut [f64]) {
         let layout = &self.mode.layout;
         let [n, m, h] = [states.len(), self.model.run.conserved.len(), self.mode.program.held.len()];
         let (conserved, held) = (layout.conserved as usize, layout.held as usize);
@@ -254,6 +318,7 @@ impl<'m> Back<'m> {
             .iter()
             .chain(&self.gathered[conserved..conserved + m])
             .chain(&self.gathered[held..held + h])
+            .chain([&instant])
             .copied()
             .collect();
         let weigh = |row: &Vec<f64>| -> f64 {

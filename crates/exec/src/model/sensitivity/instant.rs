@@ -73,6 +73,7 @@ impl Model {
         let variation = self.variation.as_mut().expect("it is varied");
         for j in 0..instants.len() {
             let moves = std::mem::replace(&mut variation.instant[j], 0.0);
+            variation.passed[j] = moves;
             for i in 0..n {
                 s[j * n + i] = variation.states[j][i] - if moves == 0.0 { 0.0 } else { after[i] * moves };
             }

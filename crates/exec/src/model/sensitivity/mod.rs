@@ -10,6 +10,7 @@ mod instant;
 mod start;
 mod tape;
 
+pub use back::SampleWeights;
 pub use tape::{Tape, Taped};
 
 use super::Model;
@@ -46,8 +47,9 @@ pub(super) struct Variation {
     conserved: Vec<Vec<f64>>,
     /// The states: at the start; at an event along its moving instant.
     states: Vec<Vec<f64>>,
-    /// The instant of the event that is handled.
+    /// The instant of the event that is handled, and that of the last one that was.
     instant: Vec<f64>,
+    passed: Vec<f64>,
     /// What is known before a round of events: sums, what storages keep, the new values of all actions.
     sums: Vec<Vec<f64>>,
     stored: Vec<Vec<f64>>,
@@ -76,6 +78,7 @@ impl Model {
             conserved: rows(program.conserved.len()),
             states: rows(program.states.len()),
             instant: vec![0.0; count],
+            passed: vec![0.0; count],
             sums: rows(0),
             stored: rows(program.jumps.as_ref().map_or(0, |j| j.stored.len())),
             values: rows(self.events.values.len()),

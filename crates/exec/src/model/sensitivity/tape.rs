@@ -37,8 +37,8 @@ pub(super) enum From {
     Step,
     /// By an event that changes no derivative.
     Switch,
-    /// By an event: row by row the derivatives of states, conserved constants and held signals after it, by each of these
-    /// before it, then by each quantity.
+    /// By an event: row by row the derivatives of states, conserved constants and held signals after it, and of its instant,
+    /// by each of these before it, then by each quantity.
     Event(Vec<Vec<f64>>),
 }
 
@@ -163,11 +163,10 @@ impl<'m> Taped<'m> {
             let mut moved = self.vary_along(&own, &directions, [n, m, h]);
             self.model.handle_varied(t, x, &mut moved)?;
             let variation = self.model.variation.as_ref().expect("it was put there");
-            let after = moved.chunks(n.max(1)).zip(&variation.conserved).zip(&variation.held);
-            match n {
-                0 => moves.extend(variation.conserved.iter().zip(&variation.held).map(|(c, h)| [&c[..], h].concat())),
-                _ => moves.extend(after.map(|((s, c), h)| [s, c, h].concat())),
-            }
+            moves.extend((0..directions.len()).map(|j| {
+                let states = &moved[j * n..][..n];
+                [states, &variation.conserved[j], &variation.held[j], &variation.passed[j..=j]].concat()
+            }));
         }
         self.model.variation = Some(own);
         self.note(t, x, From::Event(moves));
@@ -187,6 +186,7 @@ impl<'m> Taped<'m> {
             conserved: rows(m),
             states: rows(n),
             instant: vec![0.0; directions.len()],
+            passed: vec![0.0; directions.len()],
             sums: rows(0),
             stored: rows(own.stored.first().map_or(0, Vec::len)),
             values: rows(own.values.first().map_or(0, Vec::len)),
