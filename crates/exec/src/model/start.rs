@@ -210,19 +210,18 @@ impl Model {
         rates: &[f64],
         pulls: &[f64],
     ) -> Option<(f64, Vec<f64>)> {
+        // Where loops are closed a step leads off them.
+        if !self.code.program.positions.is_empty() {
+            return None;
+        }
         let mut part = 1.0;
         for _ in 0..HALVINGS {
             let there: Vec<f64> = x.iter().zip(step).map(|(x, step)| x + part * step).collect();
-            match self.rates_at(t, &there) {
-                Ok(()) => {
-                    let far = |(i, rate): (usize, &f64)| rate.abs() > UNLIKE * (rates[i].abs() + part * pulls[i]);
-                    if !self.dx.iter().enumerate().any(far) {
-                        return if part < 1.0 { Some((part, self.at_rest(t, &there).ok()?.1)) } else { None };
-                    }
+            if self.rates_at(t, &there).is_ok() {
+                let far = |(i, rate): (usize, &f64)| rate.abs() > UNLIKE * (rates[i].abs() + part * pulls[i]);
+                if !self.dx.iter().enumerate().any(far) {
+                    return if part < 1.0 { Some((part, self.at_rest(t, &there).ok()?.1)) } else { None };
                 }
-                // Where a loop cannot be closed nothing is known of laws.
-                Err(_) if !self.code.program.positions.is_empty() => return None,
-                Err(_) => {}
             }
             part *= 0.5;
         }

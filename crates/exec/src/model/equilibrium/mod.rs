@@ -263,12 +263,13 @@ impl Model {
             least.get_or_insert_with(first).update(&at.rates, &rest);
             let stands = newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs());
             // Along a leaf rates vanish with the relations that it keeps, and steps are those of positions that turn.
-            let reached = rest.is_reached(&at) && (leaf.is_some() || rest.is_near(&at, &newton.step));
+            let rests = rest.is_reached(&at);
+            let reached = rests && (leaf.is_some() || rest.is_near(&at, &newton.step));
             if stands || rest.is_exact(&at) {
                 if reached {
                     return Ok(found());
                 }
-                if stands && pseudo_step.is_infinite() {
+                if pseudo_step.is_infinite() && (stands || !rests) {
                     break;
                 }
             }
