@@ -143,9 +143,9 @@ impl Exprs {
         if terms.is_empty() {
             return self.number(constant);
         }
-        let whole = |x: &mut Exprs, term: &Term| {
-            let made = |x: &mut Exprs| x.scale(&term.number, term.monomial);
-            term.as_it_stands.unwrap_or_else(|| made(x))
+        let whole = |x: &mut Exprs, term: &Term| match term.as_it_stands {
+            Some(whole) => whole,
+            None => x.scale(&term.number, term.monomial),
         };
         if let ([single], true) = (&terms[..], constant.is_zero()) {
             return whole(self, single);

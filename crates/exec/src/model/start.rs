@@ -1,6 +1,7 @@
 //! Consistent start values: the given ones hold, the others are solved for by Gauss-Newton iteration of minimum norm, and
 //! what remains undetermined is zero, or as guessed.
 
+use super::equilibrium::exchanged;
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
 use crate::bytecode::{Layout, Routine};
@@ -723,7 +724,7 @@ impl Model {
 
 /// The greatest rate, in 1/s, at which a state moves by itself or two move each other.
 fn greatest_pair(jacobian: &[f64], n: usize) -> f64 {
-    let pair = |i: usize, j: usize| (jacobian[i * n + j] * jacobian[j * n + i]).abs().sqrt();
+    let pair = |i: usize, j: usize| exchanged(jacobian[i * n + j], jacobian[j * n + i]);
     (0..n).flat_map(|i| (0..=i).map(move |j| (i, j))).fold(0.0f64, |most, (i, j)| most.max(pair(i, j)))
 }
 

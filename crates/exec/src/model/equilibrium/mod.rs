@@ -11,6 +11,8 @@ mod point;
 mod rest;
 mod tangent;
 
+pub(super) use point::exchanged;
+
 use super::{EquilibriumError, Model};
 use halfarrow_sim::{Events, Jacobian, System};
 use leaf::Leaf;
@@ -169,8 +171,7 @@ impl Model {
             return Ok(found);
         }
         let released = self.release_loads(within, t, x);
-        let settled = released.and_then(|near| self.settle(&mut jacobian, within, t, &near).ok());
-        let found = settled.and_then(|found| self.audited(leaf, t, found).ok());
+        let found = released.and_then(|near| self.settled(&mut jacobian, within, t, &near));
         found.or_else(|| self.settle_away(&mut jacobian, within, t, x)).ok_or(refused)
     }
 
@@ -194,8 +195,7 @@ impl Model {
         let step: Vec<f64> = step.iter().map(|step| part * step).collect();
         let there = self.moved(within.0, t, x, &step)?;
         let inert = self.inert(jacobian, t, &there).ok()?;
-        let settled = self.settle(jacobian, (within.0, &inert), t, &there).ok();
-        settled.and_then(|found| self.audited(within.0, t, found).ok())
+        self.settled(jacobian, (within.0, &inert), t, &there)
     }
 
     /// From where laws are flat, or infinitely steep, a slope says nothing of what is further on: a pipe in which nothing flows, a
@@ -220,14 +220,25 @@ impl Model {
                 let Some(next) = self.moved(within.0, t, &there, &step) else { break };
                 there = next;
                 let Ok(inert) = self.inert(jacobian, t, &there) else { break };
-                let settled = self.settle(jacobian, (within.0, &inert), t, &there).ok();
-                let found = settled.and_then(|found| self.audited(within.0, t, found).ok());
+                let found = self.settled(jacobian, (within.0, &inert), t, &there);
                 if let Some(found) = found.filter(|found| self.rests_at(jacobian, within.0, t, &found.x)) {
                     return Some(found);
                 }
             }
         }
         None
+    }
+
+    /// What a search from `x` finds, if constraints are kept there.
+    fn settled(
+        &mut self,
+        jacobian: &mut Jacobian,
+        within: (Option<&Leaf>, &[bool]),
+        t: f64,
+        x: &[f64],
+    ) -> Option<Equilibrium> {
+        let found = self.settle(jacobian, within, t, x).ok()?;
+        self.audited(within.0, t, found).ok()
     }
 
     /// What was found, if the constraints are kept there.

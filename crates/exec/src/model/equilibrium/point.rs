@@ -56,11 +56,7 @@ impl LinearisedPoint {
     /// The fastest rate of a state by itself, or at which two states exchange what they hold.
     pub fn fastest_pair(&self) -> f64 {
         let place = |i: usize, j: usize| self.jacobian.binary_search_by_key(&(j, i), |e| (e.1, e.0));
-        let mean = |a: f64, b: f64| match (a * b).abs() {
-            product if product.is_finite() => product.sqrt(),
-            _ => a.abs().sqrt() * b.abs().sqrt(),
-        };
-        let turned = |&(i, j, v): &Entry| place(j, i).map_or(0.0, |at| mean(v, self.jacobian[at].2));
+        let turned = |&(i, j, v): &Entry| place(j, i).map_or(0.0, |at| exchanged(v, self.jacobian[at].2));
         self.jacobian.iter().map(turned).fold(0.0f64, f64::max)
     }
 
@@ -208,6 +204,14 @@ impl Model {
         let mut entries = Vec::with_capacity(self.code.sparsity.nonzeros());
         jacobian.visit(self, t, x, |row, column, _, value| entries.push((row, column, value)))?;
         Ok(entries)
+    }
+}
+
+/// How fast two states exchange what they hold, by how they act on each other; also where the product of both is no number.
+pub(in crate::model) fn exchanged(a: f64, b: f64) -> f64 {
+    match (a * b).abs() {
+        product if product.is_finite() => product.sqrt(),
+        _ => a.abs().sqrt() * b.abs().sqrt(),
     }
 }
 
