@@ -64,6 +64,43 @@ fn a_circuit_has_the_poles_of_its_polynomial() {
     assert_eq!((report.observability.rank, report.observability.structural_rank), (Some(2), Some(2)));
 }
 
+/// Masses in a row, joined by springs with dampers: what a force at the first does to the speed of the last passes all
+/// joints but the one to the ground, and only where a joint carries nothing (s = -k/d) is it lost. At rest the last one
+/// stands still, whatever the force.
+#[test]
+fn a_row_of_masses_loses_what_a_joint_does_not_carry() {
+    for decades in [1.0, 4.0, 9.0] {
+        for seed in 0..12_u32 {
+            let mut noise = 17 * seed + 1;
+            let mut drawn = || {
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                10f64.powf(decades * (f64::from(noise) / f64::from(u32::MAX) - 0.5))
+            };
+            let joints = 2 + seed as usize % 3;
+            let mut text = "model Row\ninput F : N = 0\nSe:force(F) -> v0\n1:v0 -> C:s(k = 2 N/m)\n".to_string();
+            let mut wanted = vec![0.0];
+            text += &format!("v0 -> I:m0({})\n", drawn());
+            for i in 1..=joints {
+                let (k, d) = (drawn(), drawn());
+                wanted.push(-k / d);
+                text += &format!("v{} -> 0:j{i} -> 1:v{i} -> I:m{i}({})\nj{i} -> 1:g{i}\n", i - 1, drawn());
+                text += &format!("g{i} -> C:s{i}(k = {k})\ng{i} -> R:d{i}({d})\n");
+            }
+            text += &format!("output y = v{joints}.f\n");
+            let report = linearized(&model(&text), &at(Point::Start));
+            wanted.sort_by(f64::total_cmp);
+            let found = report.zeros.expect("zeros");
+            assert_eq!(found.len(), wanted.len(), "{decades} decades, {seed}: {found:?} is not {wanted:?}");
+            for (found, wanted) in found.iter().zip(&wanted) {
+                let off = (found[0] - wanted).abs().max(found[1].abs());
+                assert!(off <= 1e-7 * wanted.abs(), "{decades} decades, {seed}: {found:?} is not {wanted}");
+            }
+            let (order, reached) = (report.controllability.order, report.controllability.rank);
+            assert_eq!((reached, report.observability.rank), (Some(order), Some(order)), "{decades} decades, {seed}");
+        }
+    }
+}
+
 #[test]
 fn a_motor_has_the_gain_and_the_poles_of_its_data() {
     let motor = model(

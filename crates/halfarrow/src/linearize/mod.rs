@@ -1,8 +1,10 @@
 //! A model near a point: matrices, poles, zeros, what inputs reach and outputs see.
 
+mod known;
 mod picture;
 mod response;
 mod stability;
+mod state_space;
 mod structure;
 mod symbolic;
 mod zeros;
@@ -225,6 +227,8 @@ impl Model {
         };
         let (stability, uncertain) = stability::stability(&linear.a, &poles);
         notes.extend(uncertain);
+        let (zeros, uncertain) = zeros::zeros(&linear);
+        notes.extend(uncertain);
         notes.extend(self.what_holds(&system, &linear, at));
         let symbolic =
             if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
@@ -243,7 +247,7 @@ impl Model {
                 .map(|name| terminal(name, observed(program, name).and_then(|o| unit(&o.unit))))
                 .collect(),
             modes: modes(&poles),
-            zeros: zeros::zeros(&linear),
+            zeros,
             stable: stability == Stability::Asymptotic,
             stability,
             poles,

@@ -42,11 +42,11 @@ pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option
         (false, true) => Stability::Asymptotic,
         (false, false) => Stability::Marginal,
     };
-    (stability, worst(poles, &off))
+    (stability, worst("pole", poles, &off))
 }
 
-/// The pole of which the fewest digits are known, if these are few.
-fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
+/// The pole, or zero, of which the fewest digits are known, if these are few.
+pub(super) fn worst(what: &str, poles: &[Complex], off: &[f64]) -> Option<String> {
     let digits = |p: &Complex, off: f64| -libm::log10(off / libm::hypot(p[0], p[1]));
     // A pole below a rounding of the greatest one is zero, and known as that.
     let size = |p: &Complex| libm::hypot(p[0], p[1]);
@@ -60,8 +60,8 @@ fn worst(poles: &[Complex], off: &[f64]) -> Option<String> {
     let name =
         if pole[1] == 0.0 { format!("{:.3e}", pole[0]) } else { format!("{:.3e} ± {:.3e} i", pole[0], pole[1].abs()) };
     Some(format!(
-        "of the pole {name} about {known} digits are known: the entries of the matrix are of such different magnitudes, or \
-         poles so near to each other, that rounding moves it"
+        "of the {what} {name} about {known} digits are known: the entries of the matrix are of such different magnitudes, or \
+         {what}s so near to each other, that rounding moves it"
     ))
 }
 

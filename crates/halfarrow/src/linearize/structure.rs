@@ -7,11 +7,9 @@ use halfarrow_exec::Linearised;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::linear_algebra::singular_values;
 use crate::model::Model;
 
-/// Singular values below this part of the greatest count as zero.
-const RANK: f64 = 1e-10;
+use super::state_space::StateSpace;
 
 /// Controllability or observability.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,12 +39,10 @@ impl Model {
         outputs: &[String],
     ) -> Result<(ReachReport, ReachReport), Error> {
         let causal = self.causal_graph()?;
-        let transposed = |m: &[Vec<f64>], columns: usize| -> Vec<Vec<f64>> {
-            (0..columns).map(|j| m.iter().map(|row| row[j]).collect()).collect()
-        };
         let n = linear.a.len();
-        let control = rank(&linear.a, &linear.b, inputs.len());
-        let observe = rank(&transposed(&linear.a, n), &transposed(&linear.c, n), outputs.len());
+        let system = StateSpace::scaled(linear);
+        let control = system.as_ref().map(|system| system.transposed().seen());
+        let observe = system.map(StateSpace::seen);
         let sources = sources_of(&causal.graph, inputs);
         let by_paths = sources.as_ref().and_then(|sources| control_reach(&causal, sources));
         let seen = variables_of(&causal.graph, outputs);
@@ -84,7 +80,10 @@ fn report(causal: &CausalGraph, order: usize, rank: Option<usize>, reach: Option
             reach.order
         )),
         Some(rank) if rank < structural => {
-            Some("the rank is lower than the structure allows: the given parameters are special".into())
+            Some(
+                "the rank is lower than the structure allows: the given parameters are special, or so far apart in size that rounding hides it"
+                    .into(),
+            )
         }
         Some(rank) if rank > structural => Some(
             "the rank is higher than causal paths promise: their condition is sufficient, not necessary, here".into(),
@@ -100,47 +99,6 @@ fn report(causal: &CausalGraph, order: usize, rank: Option<usize>, reach: Option
         unattained: names(&reach.unattained),
         note,
     }
-}
-
-/// Dimension of the space that `b` reaches through `a`: a basis is widened by what `a` makes of it, each direction of length 1,
-/// until nothing new comes.
-fn rank(a: &[Vec<f64>], b: &[Vec<f64>], columns: usize) -> Option<usize> {
-    let n = a.len();
-    if n == 0 || columns == 0 {
-        return Some(0);
-    }
-    let mut a_balanced = nalgebra::DMatrix::from_fn(n, n, |i, j| a[i][j]);
-    let scale = nalgebra::linalg::balancing::balance_parlett_reinsch(&mut a_balanced);
-    let size = a_balanced.amax().max(f64::MIN_POSITIVE);
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let mut fresh: Vec<Vec<f64>> = (0..columns).map(|j| (0..n).map(|i| b[i][j] / scale[i]).collect()).collect();
-    while !fresh.is_empty() && basis.len() < n {
-        let mut next = Vec::new();
-        for vector in fresh.drain(..) {
-            if let Some(new) = beyond(&basis, vector) {
-                let moved = (0..n).map(|i| (0..n).map(|j| a_balanced[(i, j)] * new[j]).sum::<f64>() / size).collect();
-                next.push(moved);
-                basis.push(new);
-            }
-        }
-        fresh = next;
-    }
-    let values = singular_values(&basis, n)?;
-    Some(values.iter().filter(|v| **v > RANK).count())
-}
-
-/// What a vector adds to an orthonormal basis, of length 1; `None` if that is rounding.
-fn beyond(basis: &[Vec<f64>], mut vector: Vec<f64>) -> Option<Vec<f64>> {
-    let length = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let before = length(&vector);
-    for _ in 0..2 {
-        for own in basis {
-            let part: f64 = own.iter().zip(&vector).map(|(a, b)| a * b).sum();
-            vector.iter_mut().zip(own).for_each(|(v, own)| *v -= part * own);
-        }
-    }
-    let after = length(&vector);
-    (after > RANK * before && after > 0.0).then(|| vector.iter().map(|v| v / after).collect())
 }
 
 /// The sources whose values read the inputs; `None` if an input acts elsewhere as well.
