@@ -194,7 +194,7 @@ impl fmt::Display for EmitError {
             EmitError::Implicit => f.write_str("only explicit equations are exported: use the form minimal or kane"),
             EmitError::Jumps(states) => write!(
                 f,
-                "a source that jumps changes {}, which are states of this form: export the form minimal, whose states do not jump",
+                "a source or a law that jumps changes {}, which are states of this form: export the form minimal, whose states do not jump",
                 states.join(", ")
             ),
             EmitError::Impulses(unknowns) => write!(

@@ -586,3 +586,41 @@ fn ratios_that_leap_keep_momentum() {
         }
     }
 }
+
+/// Where the law of a storage jumps, nothing pushes: what it stores is kept, with what is stored in those that move with it,
+/// in every form, in whatever order they are written, whatever makes it jump.
+#[test]
+fn laws_that_jump_keep_what_is_stored() {
+    let shaft = |own: &str, other: &str| format!("model Shaft\n1:v -> {own}\nv -> {other}\nv -> R:r(0.1)\n");
+    let one = "I:a(1, f0 = 1)";
+    let until = (-0.1f64 / 2.0).exp();
+    // One unit of mass beside another that is 1 and then 3, after a second that slows both: two units share what four have.
+    let after = until / 2.0 * (-0.1f64 / 4.0).exp();
+    for jump in [
+        "I:b(if t > 1 then 3 else 1)",
+        "I:b(2 + sign(t - 1))",
+        "I:b(if floor(t) >= 1 then 3 else 1)",
+        "I:b(f = p/(if t > 1 then 3 else 1))",
+        "I:b(p = (if t > 1 then 3 else 1)*f)",
+        "I:b(if 2*t > 2 then 3 + 0*t else 1)",
+    ] {
+        for text in [shaft(one, jump), shaft(jump, one)] {
+            for form in FORMS {
+                let trace = trace(&text, &Run { form, ..exact(2.0) });
+                let last = *column(&trace, "a.f").last().expect("samples");
+                assert!(near(last, after, 1e-9), "{form:?}: {last} is not {after}\n{text}");
+            }
+        }
+    }
+    // Charge alike, also where a state decides; and a storage alone whose law nothing inverts.
+    let plates =
+        "model Plates\n0:n -> C:a(1, e0 = 1)\nn -> C:b(if x > 0.5 then 3 else 1)\nn -> R:r(1e9)\nstate x' = 1 from 0\n";
+    let lone = "model Lone\n1:v -> I:b(p = (if t > 0.5 then 3 else 1)*(f + f^5), f0 = 1)\nv -> R:r(1e-12)\n";
+    for form in FORMS {
+        let at_end =
+            |text: &str, name: &str| *column(&trace(text, &Run { form, ..exact(1.0) }), name).last().expect("samples");
+        assert!(near(at_end(plates, "a.e"), 0.5, 1e-8), "{form:?}");
+        let f = at_end(lone, "b.f");
+        assert!(near(f + f.powi(5), 2.0 / 3.0, 1e-9), "{form:?}: {f}");
+    }
+}

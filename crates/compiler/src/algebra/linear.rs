@@ -128,14 +128,27 @@ impl Exprs {
 
     /// Whether the expression may leap while what it reads moves steadily, as `if x > 0 then 1 else 2` does.
     pub fn may_leap(&self, e: Expr) -> bool {
-        let table = |table| self.table1d(table).interpolation();
+        self.below(&[e], &|_| true).into_iter().any(|part| self.is_leap(part))
+    }
+
+    /// Whether it may leap while what these symbols stand for moves steadily.
+    pub fn may_leap_by(&self, e: Expr, by: &dyn Fn(Symbol) -> bool) -> bool {
         self.below(&[e], &|_| true).into_iter().any(|part| match *self.node(part) {
+            Node::Select(condition, ..) => self.depends_on_any(condition, by),
+            _ => self.is_leap(part) && self.depends_on_any(part, by),
+        })
+    }
+
+    /// Whether the part leaps itself.
+    fn is_leap(&self, part: Expr) -> bool {
+        let table = |table| self.table1d(table).interpolation();
+        match *self.node(part) {
             Node::Select(..) | Node::Compare(..) | Node::And(..) | Node::Or(..) | Node::Not(_) => true,
             Node::Call(function, _) => matches!(function, Function::Sign | Function::Floor | Function::Mod),
             Node::Table(of, _) => table(of) == Interpolation::Step,
             Node::TableSlope(of, _) => table(of) != Interpolation::Cubic,
             _ => false,
-        })
+        }
     }
 
     /// What the expression divides by that is not known to be nonzero.

@@ -433,11 +433,12 @@ impl<'a> Assembled<'a> {
     }
 
     /// Whether a group can be written with speeds (or stored quantities) of the independent storages as states: no
-    /// varying source enters, and every law gives `X` from `z`.
+    /// varying source enters, no law jumps, and every law gives `X` from `z`.
     fn in_velocity_form(&mut self, group: &[&StoragePort]) -> bool {
         let dependent = group.iter().filter(|c| c.state.role == Role::Dependent);
         let constant_sources = dependent.clone().all(|storage_port| !self.is_moved(storage_port.z));
-        constant_sources && group.iter().all(|storage_port| self.stored_of(storage_port).is_some())
+        let steady = !group.iter().any(|storage_port| storage_port.may_jump(&self.d));
+        steady && constant_sources && group.iter().all(|storage_port| self.stored_of(storage_port).is_some())
     }
 
     /// Whether a source that is no constant stands in the row of a variable.
@@ -683,6 +684,18 @@ impl StoragePort<'_> {
     }
 
     /// The co-energy symbols of all ports of the storage.
+    /// Whether its law may jump while what it stores moves steadily: at an instant, with another variable, with an input.
+    pub(super) fn may_jump(&self, d: &Definitions) -> bool {
+        let law = match self.law {
+            StorageLaw::Integral(law) | StorageLaw::Derivative(law) | StorageLaw::Implicit(law) => law,
+            StorageLaw::Known { .. } => return false,
+        };
+        let own = self.storage_speeds(d);
+        let of_others = |s: Symbol| !own.contains(&s) && !self.storage.stored.contains(&s);
+        d.x.may_leap_by(law, &of_others)
+            || d.x.depends_on_any(law, &|s| matches!(d.meaning(s), Some(Meaning::Input(_) | Meaning::Held(_))))
+    }
+
     fn storage_speeds(&self, d: &Definitions) -> BTreeSet<Symbol> {
         let ports = 0..self.storage.laws.len() as u32;
         let port = |port| PortRef { element: self.state.port.element, port };

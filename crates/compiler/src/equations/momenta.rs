@@ -1,4 +1,4 @@
-//! What stays as it is where a source jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
+//! What stays as it is where a source or the law of a storage jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
 //! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
 use rustc_hash::FxHashSet;
@@ -16,7 +16,7 @@ pub struct Momentum {
     pub speed: Symbol,
     /// The sum, in stored quantities of the graph: the same in all forms.
     pub sum: Expr,
-    /// Whether a source that is no constant moves one of its storages.
+    /// Whether a source that is no constant moves one of its storages, or a law of one may jump.
     pub moved: bool,
 }
 
@@ -31,13 +31,15 @@ impl Assembled<'_> {
         for (members, speeds) in groups(&mut self.d.x, &storage_ports, &truth.ports.virtual_speeds, &mut rows) {
             let dependent: Vec<&StoragePort> =
                 members.iter().map(|&m| &storage_ports[m]).filter(|c| c.state.role == Role::Dependent).collect();
-            if dependent.is_empty() {
+            let jumps = members.iter().any(|&m| storage_ports[m].may_jump(&self.d));
+            // A storage alone keeps what is its state.
+            if dependent.is_empty() && !(jumps && members.iter().any(|&m| self.is_state(storage_ports[m].z))) {
                 continue;
             }
             let mut inputs = FxHashSet::default();
             dependent.iter().for_each(|c| inputs.extend(rows.inputs_of(&mut self.d.x, c.z)));
             let mut givers = inputs.iter().filter_map(|&input| rows.giver(input));
-            let moved = givers.any(|giver| is_moving(&mut self.d, truth, giver));
+            let moved = jumps || givers.any(|giver| is_moving(&mut self.d, truth, giver));
             // Else the states tell the storages, whatever form they are in.
             if !moved && members.iter().all(|&m| self.stored_of(&storage_ports[m]).is_some()) {
                 continue;
@@ -59,6 +61,10 @@ impl Assembled<'_> {
             }
         }
         all
+    }
+
+    fn is_state(&self, symbol: Symbol) -> bool {
+        self.states.iter().any(|state| state.symbol == symbol)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What keeps its value when a source jumps.
+//! What keeps its value when a source or the law of a storage jumps.
 
 use super::Value;
 use super::dataflow::Dataflow;
@@ -8,7 +8,7 @@ use crate::bond_graph::{BondGraph, Kind};
 use crate::equations::{Equations, Momentum};
 use std::collections::BTreeMap;
 
-/// Speeds that are states although a source that can jump moves storages that follow them.
+/// Speeds that are states although a source that can jump moves storages that follow them, or a law of these jumps.
 pub(super) fn kept(flow: Dataflow<'_>, equations: &Equations, momenta: &BTreeMap<Symbol, Value>) -> Vec<(u32, Value)> {
     if !equations.residuals.is_empty() {
         return Vec::new();

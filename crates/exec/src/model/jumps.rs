@@ -1,4 +1,4 @@
-//! Jumps of sources where speeds are states: sums of stored quantities are conserved, and the speeds follow.
+//! Jumps of sources and laws where speeds are states: sums of stored quantities are conserved, and the speeds follow.
 
 use super::Model;
 use crate::bytecode::{Layout, Routine};
@@ -20,7 +20,7 @@ pub(super) struct ConservedSums {
 }
 
 impl ConservedSums {
-    /// `None` where no source that jumps moves a storage that follows a state.
+    /// `None` where no source that jumps moves a storage that follows a state, and no law of one jumps.
     pub fn of(program: &Program, layout: &Layout) -> Option<ConservedSums> {
         let (states, sums): (Vec<usize>, Vec<Value>) = program.kept.iter().map(|k| (k.0 as usize, k.1)).unzip();
         (!states.is_empty()).then(|| ConservedSums { sums: layout.routine(program, &sums), states })
@@ -89,7 +89,7 @@ impl Model {
             }
             last = length;
         }
-        let what = "the speeds after a jump of a source".to_string();
+        let what = "the speeds after a jump of a source or a law".to_string();
         let residual = residual.iter().fold(0.0f64, |most, m| most.max(m.abs()));
         Err(Failure::NoConvergence { time: t, what, iterations: ITERATIONS, residual })
     }

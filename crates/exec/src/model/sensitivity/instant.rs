@@ -248,7 +248,7 @@ impl Model {
             let Some(step) = step else {
                 return Err(Model::without_derivative(
                     t,
-                    "the speeds after a jump of a source",
+                    "the speeds after a jump of a source or a law",
                     "they do not follow uniquely",
                 ));
             };
