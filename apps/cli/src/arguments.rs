@@ -385,7 +385,8 @@ pub struct Simulate {
     /// End of the run, in s or with a unit (`10`, `500ms`); it begins at 0
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
-    /// Time between recorded points, in s; without it every step is recorded
+    /// Time between recorded points, in s; without it every step is recorded, of methods of variable step with three points
+    /// inside (with up to 500 variables)
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// The formulation
@@ -653,7 +654,8 @@ pub struct Sweep {
     /// End of each run, in s
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
-    /// Time between the samples that are kept or reduced, in s; without it every step is one
+    /// Time between the samples that are kept or reduced, in s; without it every step is one, and what is greatest and what
+    /// means are is that of the motion between them too, where the method knows it (those of variable step)
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// The method

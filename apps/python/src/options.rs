@@ -72,6 +72,7 @@ impl RunOptions {
             atol: self.atol,
             project: self.project,
             minimum_norm: self.minimum_norm,
+            inside: true,
             inputs: inputs(given)?,
             start: start(&self.start)?,
             record: match kind.as_str() {

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::compiled::{Compiled, Ready};
 use crate::error::{Error, Problem};
 use crate::model::Model;
+use crate::pieces::{Quartic, STEP, WEIGHTS, pieces};
 use crate::run::{Progress, Run, Simulated, units};
 use crate::sensitivity::By;
 use crate::sweep::{Reduce, Reduction};
@@ -129,6 +130,21 @@ impl Model {
     }
 }
 
+/// Why no parameter can be differentiated by.
+fn nothing_to_vary(without: &[(String, String)]) -> String {
+    let why = match without {
+        [] => "the model has no parameter that may change".to_string(),
+        [(_, why), ..] if without.iter().all(|other| other.1 == *why) => why.clone(),
+        several => {
+            let each: Vec<String> = several.iter().map(|(name, why)| format!("`{name}`: {why}")).collect();
+            each.join("; ")
+        }
+    };
+    format!(
+        "there is nothing to take a derivative by: {why}; --sensitivity names start values and constant inputs, too"
+    )
+}
+
 /// How a value in a unit moves with that in SI units.
 fn step(unit: &Unit) -> f64 {
     unit.from_si_f64(1.0) - unit.from_si_f64(0.0)
@@ -167,9 +183,18 @@ impl Compiled {
                 }
             }
         }
+        if run.sensitivities.is_empty() {
+            return Err(Problem::BadOption { reason: nothing_to_vary(&without) }.into());
+        }
         let system = (**system).clone();
         Ok(Gradient { without, ..self.model().gradient_with(system, &run, objective, progress)? })
     }
+}
+
+/// How fast a variable moves at both ends of a step of this length, by its samples.
+fn slopes_at_ends(values: &[f64], h: f64) -> [f64; 2] {
+    let quartic = Quartic::through(std::array::from_fn(|k| values[k]));
+    [-1.0, 1.0].map(|u| quartic.slope(u) * 2.0 / h)
 }
 
 impl Reduce {
@@ -197,38 +222,95 @@ impl Reduce {
             slope * values[i]
         };
         let length = last - first;
+        // The turn inside of a step that goes beyond all samples, told by those of its step: its place is at rest, whatever
+        // moves the ends.
+        let turn = |own: &mut Vec<f64>, by_time: &mut Vec<f64>, sign: f64| {
+            let most = values.iter().map(|v| sign * v).fold(f64::NEG_INFINITY, f64::max);
+            let steps = pieces(times).filter(|piece| piece.len() == STEP);
+            let turns = steps.filter_map(|piece| {
+                let samples: [f64; STEP] = std::array::from_fn(|k| values[piece.start + k]);
+                let (u, value) = Quartic::through(samples).beyond(samples, sign)?;
+                (sign * value > most).then_some((piece, u, value))
+            });
+            let (piece, u, value) = turns.max_by(|a, b| (sign * a.2).total_cmp(&(sign * b.2)))?;
+            let (first, last) = (piece.start, piece.end - 1);
+            let slopes = slopes_at_ends(&values[piece], times[last] - times[first]);
+            let counts = Quartic::counts(u);
+            counts.iter().enumerate().for_each(|(k, count)| own[first + k] = *count);
+            by_time[first] = -counts[0] * slopes[0];
+            by_time[last] = -counts[STEP - 1] * slopes[1];
+            Some(value)
+        };
         let value = match self.reduction {
             Reduction::Initial => at_one(own, 0, 1.0),
             Reduction::Final => at_one(own, values.len() - 1, 1.0),
-            Reduction::Min => at_one(own, place(&|a, b| a < b), 1.0),
-            Reduction::Max => at_one(own, place(&|a, b| a > b), 1.0),
+            Reduction::Min => {
+                let i = place(&|a, b| a < b);
+                turn(own, &mut by_time, -1.0).unwrap_or_else(|| at_one(own, i, 1.0))
+            }
+            Reduction::Max => {
+                let i = place(&|a, b| a > b);
+                turn(own, &mut by_time, 1.0).unwrap_or_else(|| at_one(own, i, 1.0))
+            }
             Reduction::MaxAbs => {
                 let i = place(&|a, b| a.abs() > b.abs());
-                at_one(own, i, if values[i] < 0.0 { -1.0 } else { 1.0 })
+                let turned = if values[i] < 0.0 { -1.0 } else { 1.0 };
+                match turn(own, &mut by_time, turned) {
+                    Some(value) => {
+                        own.iter_mut().chain(&mut by_time).for_each(|w| *w *= turned);
+                        turned * value
+                    }
+                    None => at_one(own, i, turned),
+                }
             }
             Reduction::Mean => {
                 let mut mean = 0.0;
-                for (i, t) in times.windows(2).enumerate() {
-                    let part = 0.5 * (t[1] - t[0]) / length;
-                    mean += part * (values[i] + values[i + 1]);
-                    let slope = 0.5 * (values[i] + values[i + 1]) / length;
-                    by_time[i] -= slope;
-                    by_time[i + 1] += slope;
-                    own[i] += part;
-                    own[i + 1] += part;
+                for piece in pieces(times) {
+                    let (first, last) = (piece.start, piece.end - 1);
+                    let h = times[last] - times[first];
+                    if piece.len() == STEP {
+                        // What is beyond the end of a step does not count, nor how its end moves along the curve.
+                        let slopes = slopes_at_ends(&values[piece.clone()], h);
+                        for (i, weight) in piece.zip(WEIGHTS) {
+                            mean += h * weight * values[i] / length;
+                            own[i] += h * weight / length;
+                        }
+                        by_time[first] -= (values[first] + h * WEIGHTS[0] * slopes[0]) / length;
+                        by_time[last] += (values[last] - h * WEIGHTS[0] * slopes[1]) / length;
+                        continue;
+                    }
+                    let part = 0.5 * h / length;
+                    mean += part * (values[first] + values[last]);
+                    let slope = 0.5 * (values[first] + values[last]) / length;
+                    by_time[first] -= slope;
+                    by_time[last] += slope;
+                    own[first] += part;
+                    own[last] += part;
                 }
                 mean
             }
             Reduction::Rms => {
                 let mut square = 0.0;
-                for (i, t) in times.windows(2).enumerate() {
-                    let (part, [a, b]) = ((t[1] - t[0]) / (3.0 * length), [values[i], values[i + 1]]);
+                for piece in pieces(times) {
+                    let (first, last) = (piece.start, piece.end - 1);
+                    let (h, [a, b]) = (times[last] - times[first], [values[first], values[last]]);
+                    if piece.len() == STEP {
+                        let slopes = slopes_at_ends(&values[piece.clone()], h);
+                        for (i, weight) in piece.zip(WEIGHTS) {
+                            square += h * weight * values[i] * values[i] / length;
+                            own[i] += 2.0 * h * weight * values[i] / length;
+                        }
+                        by_time[first] -= (a * a + 2.0 * h * WEIGHTS[0] * a * slopes[0]) / length;
+                        by_time[last] += (b * b - 2.0 * h * WEIGHTS[0] * b * slopes[1]) / length;
+                        continue;
+                    }
+                    let part = h / (3.0 * length);
                     square += part * (a * a + a * b + b * b);
                     let slope = (a * a + a * b + b * b) / (3.0 * length);
-                    by_time[i] -= slope;
-                    by_time[i + 1] += slope;
-                    own[i] += part * (2.0 * a + b);
-                    own[i + 1] += part * (2.0 * b + a);
+                    by_time[first] -= slope;
+                    by_time[last] += slope;
+                    own[first] += part * (2.0 * a + b);
+                    own[last] += part * (2.0 * b + a);
                 }
                 let rms = square.sqrt();
                 let half = if rms > 0.0 { 0.5 / rms } else { 0.0 };

@@ -33,6 +33,9 @@ use crate::model::Model;
 use crate::sensitivity::{By, column, quantities, vary, with_derivatives};
 use crate::verdict::{Made, OPEN};
 
+/// Runs that record more variables than this record the ends of their steps only.
+const MOST_INSIDE: usize = 500;
+
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
 /// their declarations give.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +46,10 @@ pub struct Run {
     pub every: Option<f64>,
     /// Times that are recorded in the place of these, in s, ascending; the end is always recorded. Empty: as `every` says.
     pub at: Vec<f64>,
+    /// Whether methods of variable step record three points inside each step as well, where every step is recorded: what is
+    /// greatest and what means are is then known as exactly as the run, and curves are smooth. Of runs that record more than
+    /// 500 variables only gradients have them.
+    pub inside: bool,
     /// The formulation.
     pub form: Form,
     /// Form `stiff`: square of the ratio of the springs' frequency to the fastest rate of the model; `None`: 1e6.
@@ -106,6 +113,7 @@ impl Default for Run {
             to: 1.0,
             every: None,
             at: Vec::new(),
+            inside: false,
             form: Form::Minimal,
             stiffness: None,
             damping: None,
@@ -362,7 +370,8 @@ impl Model {
         run: &Run,
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<(Vec<By>, Options, Simulated, Taped), Error> {
-        let Begun { start, options, by, notes } = self.begin_explicit(system, run)?;
+        let Begun { start, mut options, by, notes } = self.begin_explicit(system, run)?;
+        options.inside = run.inside;
         let mut taped = None;
         let done = self.integrate(system, start, (&options, run.execution, &[]), (notes, Some(&mut taped)), progress);
         let done = judged(done, &Made::by(run))?;
@@ -385,7 +394,8 @@ impl Model {
         vary(system, &by)?;
         let (start, free) = self.start_with_freedom(system, run.start)?;
         notes.extend(one_of_many(free));
-        let options = options(run)?;
+        let mut options = options(run)?;
+        options.inside &= system.observed() <= MOST_INSIDE;
         if options.check(start.len()).is_ok() {
             cost::check(system, &start, &options, system.observed())?;
         }
@@ -423,7 +433,8 @@ impl Model {
         set_spring_rate(&mut system, &x)?;
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         timings.start = begun.elapsed().as_secs_f64();
-        let options = if explicit { options(run)? } else { implicit_options(run)? };
+        let mut options = if explicit { options(run)? } else { implicit_options(run)? };
+        options.inside &= system.recorded().len() <= MOST_INSIDE;
         if options.check(y.len()).is_ok() {
             let recorded = Recording::recorded(&system).len();
             cost::check(system.reference_mut(), &x, &options, recorded)?;
@@ -890,6 +901,7 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
         to: run.to,
         every: run.every,
         at: run.at.clone(),
+        inside: run.inside,
         step: run.step,
         rtol: run.rtol,
         atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),

@@ -214,7 +214,8 @@ impl Model {
         connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
         let plan = Plan::new(sweep, &system)?;
         let reducers = reducers(sweep, &mut system)?;
-        let options = options(&sweep.run)?;
+        let mut options = options(&sweep.run)?;
+        options.inside = sweep.reduce.iter().any(|reduce| reduce.reduction.is_over_time());
         options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
         let notes = projected(system.program(), sweep.run.project, sweep.run.method)?;
         crate::cost::check_stops(&system, &options)?;
@@ -477,7 +478,7 @@ impl<'a> Copies<'a> {
     /// One set by itself, with any method.
     fn alone(&mut self, work: &SweepContext<'_>, set: usize, start: crate::run::Start) -> Outcome {
         let mut x = prepare(&mut self.system, self.model, work.plan, set, start)?;
-        let mut sink = Reducers::begin(work.reducers);
+        let mut sink = Reducers::begin(work.reducers, work.options.inside);
         simulate(&mut self.system, work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
         Ok(Ended::of(sink, &mut self.system, work.options.to, &x))
     }
@@ -500,7 +501,7 @@ impl<'a> Copies<'a> {
             prepared.push(found.map(|state| x.iter_mut().zip(state).for_each(|(x, state)| x[lane] = state)));
         }
         wide.begin();
-        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers));
+        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers, work.options.inside));
         let ends = simulate_wide(wide, work.options, &mut x, &mut sinks, wanted);
         let mut outcome = |lane: usize, prepared: Result<(), String>, end: Result<Summary, Stopped>, sink| {
             prepared?;

@@ -4,7 +4,9 @@
 #![allow(clippy::disallowed_methods, reason = "values to compare with")]
 
 use super::sensitivity::{BALL, BELT, CAR, SAMPLED, collection, model, run};
-use halfarrow::{Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Start, Trace, Weighed};
+use halfarrow::{
+    Error, FixedMethod, Form, Gradient, Input, Method, Model, Record, Reduce, Run, Start, Sweep, Trace, Vary, Weighed,
+};
 
 /// Numbers between -1 and 1.
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
@@ -233,22 +235,84 @@ fn numbers_follow_the_instants_of_events() {
         (ball, 1.0, "min(height)", ["g", "h0"], [0.0, 0.0]),
     ] {
         let wanted_of = Reduce::parse(number).expect("a reduction");
-        for (method, step) in [(Method::Auto, None), (Method::Bdf, None), (Method::Fixed(FixedMethod::Rk4), Some(0.01))]
-        {
+        for (method, step, inside) in [
+            (Method::Auto, None, false),
+            (Method::Auto, None, true),
+            (Method::Bdf, None, false),
+            (Method::Bdf, None, true),
+            (Method::Radau, None, true),
+            (Method::Fixed(FixedMethod::Rk4), Some(0.01), true),
+        ] {
             let variable = number.split(['(', ')']).nth(1).expect("a variable");
             let record = Record::Names(vec![variable.into()]);
-            let asked = Run { method, step, record, rtol: 1e-9, every: None, ..run(&by, to) };
+            let asked = Run { method, step, inside, record, rtol: 1e-9, every: None, ..run(&by, to) };
             let found = model(text).gradient(&asked, &mut |trace| wanted_of.objective(trace), &mut |_| true);
             let found = found.unwrap_or_else(|error| panic!("{number} by {method:?}: {error}"));
             for (slope, wanted) in found.slopes.iter().zip(wanted) {
                 let missed = (slope.slope - wanted).abs();
                 assert!(
                     missed < 1e-5 * speed,
-                    "{number} by {} with {method:?}: {} for {wanted}",
+                    "{number} by {} with {method:?}, inside {inside}: {} for {wanted}",
                     slope.name,
                     slope.slope
                 );
             }
+        }
+    }
+}
+
+/// Between its steps a run is known as exactly as at them: heights of a throw and of a ball that bounces, of which a few long
+/// steps tell the greatest value, the mean and their derivatives.
+#[test]
+fn numbers_of_long_steps_are_those_of_the_motion() {
+    let throw =
+        "model Throw\nparam v0 = 8\nSe:w(-9.81) -> 1:v -> I:b(1, f0 = v0)\nstate h' = v.f from 0\noutput y = h\n";
+    let ball = "model Ball\nparam v0 = 8\nSe:w(-9.81) -> 1:v -> I:m(1, f0 = v0)\nstate h' = v.f from 0\n\
+                when h < 0 { reset m.f = -0.5*m.f }\noutput y = h\n";
+    let g = 9.81_f64;
+    // Of pieces of parabolas: what each starts with and how long it is, after h = v t - g t²/2 from 0.
+    let flights = |v0: f64, bounces: bool| -> Vec<[f64; 2]> {
+        let first = 2.0 * v0 / g;
+        if bounces && first < 2.0 { vec![[v0, first], [0.5 * v0, 2.0 - first]] } else { vec![[v0, 2.0]] }
+    };
+    let mean = |v0: f64, bounces: bool| {
+        let of = |[v, t]: [f64; 2]| v * t * t / 2.0 - g * t * t * t / 6.0;
+        flights(v0, bounces).into_iter().map(of).sum::<f64>() / 2.0
+    };
+    let rms = |v0: f64, bounces: bool| {
+        let of = |[v, t]: [f64; 2]| v * v * t.powi(3) / 3.0 - v * g * t.powi(4) / 4.0 + g * g * t.powi(5) / 20.0;
+        (flights(v0, bounces).into_iter().map(of).sum::<f64>() / 2.0).sqrt()
+    };
+    for (text, bounces) in [(throw, false), (ball, true)] {
+        let numbers: [(&str, &dyn Fn(f64) -> f64); 3] = [
+            ("max(y)", &|v0| v0 * v0 / (2.0 * g)),
+            ("mean(y)", &|v0| mean(v0, bounces)),
+            ("rms(y)", &|v0| rms(v0, bounces)),
+        ];
+        for (number, of) in numbers {
+            let wanted = Reduce::parse(number).expect("a reduction");
+            for method in [Method::Auto, Method::Radau] {
+                let record = Record::Names(vec!["y".into()]);
+                let asked = Run { method, inside: true, every: None, record, rtol: 1e-9, ..run(&["v0"], 2.0) };
+                let found = model(text).gradient(&asked, &mut |trace| wanted.objective(trace), &mut |_| true);
+                let found = found.unwrap_or_else(|error| panic!("{number} by {method:?}: {error}"));
+                let slope = (of(8.0 + 1e-5) - of(8.0 - 1e-5)) / 2e-5;
+                assert!((found.value - of(8.0)).abs() < 1e-8, "{number} by {method:?}: {} {}", found.value, of(8.0));
+                let missed = (found.slopes[0].slope - slope).abs();
+                assert!(missed < 1e-7, "{number} by {method:?}: {} {slope}", found.slopes[0].slope);
+            }
+            let sweep = Sweep {
+                run: Run { to: 2.0, rtol: 1e-9, ..Run::default() },
+                vary: vec![Vary::parse("v0=list(8)").expect("one value")],
+                samples: None,
+                reduce: vec![wanted],
+                restart: false,
+                units: false,
+                part: None,
+            };
+            let (columns, _) = model(text).sweep_columns(&sweep, &mut |_, _| true).expect("a sweep");
+            let value = columns.iter().find(|column| column.name == number).expect("a column").values[0];
+            assert!((value - of(8.0)).abs() < 1e-8, "{number}: {value} {}", of(8.0));
         }
     }
 }
@@ -276,6 +340,8 @@ fn what_has_no_derivative_is_refused() {
     assert!(refusal(plain, &rosenbrock).contains("second derivatives"));
     let pad = "model S\nparam v = 1, fc = 2\n1:j -> I:m(1, f0 = v)\nj -> R:pad(friction = fc)\n";
     assert!(refusal(pad, &run(&["v"], 2.0)).contains("another branch"));
+    let alone = "model M\nstate x' = -x from 1\noutput y = x\n";
+    assert!(refusal(alone, &run(&[], 1.0)).contains("no parameter that may change"));
     let short =
         model(plain).gradient(&run(&["mass"], 1.0), &mut |_| Ok(weighed((0.0, vec![vec![1.0]]))), &mut |_| true);
     let short = short.expect_err("too few").to_string();

@@ -25,7 +25,7 @@ mod variable_step;
 pub mod wide;
 
 pub use adjoint::{Backwards, Transposed, follow_back};
-pub use driver::{Crawl, Nobody, Position, Sink, Stopped, Summary, tick};
+pub use driver::{Crawl, INSIDE, Nobody, Position, Sink, Stopped, Summary, inside, tick};
 pub use events::Events;
 pub use failure::{Affected, Failure, Leap};
 pub use implicit::simulate_implicit;

@@ -101,6 +101,7 @@ fn run(arguments: &Simulate) -> Run {
         atol: arguments.atol,
         project: arguments.project,
         minimum_norm: arguments.minimum_norm,
+        inside: true,
         inputs: arguments.input.iter().map(|(name, path)| (name.clone(), path.into())).collect(),
         start: start(arguments.start),
         record: recorded(arguments, record(&arguments.record)),

@@ -384,7 +384,8 @@ class Model:
 
         Args:
             to: End of the run in s; it begins at 0.
-            every: Time between samples in s; nothing: every step.
+            every: Time between samples in s; nothing: every step, of methods of variable step with three samples inside (if up
+                to 500 variables are recorded), between which a run is as exact as at them.
             at: Times of the samples in s, ascending, in the place of these; the end is sampled too.
             method: ``auto``, ``explicit``, ``bdf`` or ``radau`` with steps of variable length; ``euler``, ``heun``, ``rk4``,
                 ``implicit-midpoint``, ``linearly-implicit-euler``, ``linearly-implicit-bdf2`` or ``rosenbrock`` with steps of
@@ -791,7 +792,7 @@ class Model:
             method: As in ``simulate``; nothing: ``rk4`` where there is a step, which runs sixteen sets at once on vectors,
                 else ``auto``.
             every, rtol, start, project, record, also, execution, sample, inputs: As in ``simulate``. Reductions go over the
-                samples.
+                samples, without ``every`` over the motion within steps of variable length.
             reduce: What is kept of each run: by the name of its column a variable and one of ``initial``, ``final``,
                 ``min``, ``max``, ``max_abs``, ``mean``, ``rms``, ``time_of_max``; or texts such as ``"max(body.f)"``.
                 Nothing: the last value of what is recorded.

@@ -34,13 +34,13 @@ impl Delay {
 
     /// The signal has come to a value, smoothly.
     pub fn append(&mut self, t: f64, value: f64, slope: f64) {
-        match self.points.back() {
-            Some(last) if t > last.t => self.points.push_back(Point { t, value, slope, jump: false }),
-            Some(_) => {}
-            None => self.begin(t, value, slope),
+        let Some(&before) = self.points.back() else { return self.begin(t, value, slope) };
+        if t > before.t {
+            self.points.push_back(Point { t, value, slope, jump: false });
         }
-        // What is older than the delay is read no more; the point before it still bounds a piece.
-        while self.points.len() > 3 && self.points[2].t + self.time < t {
+        // Samples within the step that ends here still read what it began with; what is older by the delay is read no more,
+        // but for the point before it, which bounds a piece.
+        while self.points.len() > 3 && self.points[2].t + self.time < before.t {
             self.points.pop_front();
         }
     }
@@ -148,6 +148,22 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_within_the_last_step_are_read_as_they_were() {
+        let mut delay = Delay::new(0.5);
+        let f = |t: f64| (t * t * t, 3.0 * t * t);
+        delay.begin(0.0, 0.0, 0.0);
+        for k in 1..=40 {
+            let (from, t) = (0.1 * f64::from(k - 1), 0.1 * f64::from(k));
+            delay.append(t, f(t).0, f(t).1);
+            let within = from + 0.03;
+            assert!(within < 0.5 || (delay.at(within, 0.0).0 - f(within - 0.5).0).abs() < 1e-12, "{within}");
+        }
+        // The last step may be as long as the delay.
+        delay.append(4.5, f(4.5).0, f(4.5).1);
+        assert!((delay.at(4.01, 0.0).0 - f(3.51).0).abs() < 1e-12);
+    }
 
     #[test]
     fn cubics_are_followed_exactly() {

@@ -4,6 +4,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_sim::Sink;
 
 use crate::error::Problem;
+use crate::pieces::{Quartic, STEP, WEIGHTS, is_step};
 
 /// One number of one variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -14,8 +15,9 @@ pub struct Reduce {
     pub variable: String,
 }
 
-/// Which number is kept of a variable. Over time they are over the samples of the run; means count each stretch between
-/// two samples by its length, as a straight line.
+/// Which number is kept of a variable. Over time they are over the run: within steps of a method that has a solution there,
+/// where those are [asked for](crate::Run::inside), and always in sweeps, over polynomials through samples inside; else over straight lines from
+/// one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reduction {
     /// The first value.
@@ -47,6 +49,11 @@ impl Reduction {
         Reduction::Rms,
         Reduction::TimeOfMax,
     ];
+
+    /// Whether the run between its ends counts.
+    pub(crate) fn is_over_time(self) -> bool {
+        !matches!(self, Reduction::Initial | Reduction::Final)
+    }
 
     fn name(self) -> &'static str {
         match self {
@@ -115,9 +122,9 @@ impl Reducers {
         self.wanted.iter().map(column).collect()
     }
 
-    /// A sink for one run.
-    pub fn begin(all: &[Reducers]) -> Reducing<'_> {
-        Reducing { all, last: None, begun: None, of: vec![Tally::default(); all.len()] }
+    /// A sink for one run, in which steps may have samples inside.
+    pub fn begin(all: &[Reducers], inside: bool) -> Reducing<'_> {
+        Reducing { all, last: None, begun: None, of: vec![Tally::default(); all.len()], inside, waiting: Vec::new() }
     }
 }
 
@@ -141,10 +148,46 @@ pub struct Reducing<'a> {
     begun: Option<f64>,
     last: Option<f64>,
     of: Vec<Tally>,
+    inside: bool,
+    /// Samples of which it is open whether they are inside of a step, the last one counted ahead of them.
+    waiting: Vec<(f64, Vec<f64>)>,
 }
 
 impl Sink for Reducing<'_> {
     fn sample(&mut self, t: f64, values: &[f64]) {
+        if !self.inside {
+            return self.count(t, values);
+        }
+        if self.waiting.is_empty() {
+            self.count(t, values);
+        }
+        self.waiting.push((t, values.to_vec()));
+        if self.waiting.len() < STEP {
+            return;
+        }
+        let times: Vec<f64> = self.waiting.iter().map(|sample| sample.0).collect();
+        if is_step(&times) {
+            for (k, tally) in self.of.iter_mut().enumerate() {
+                tally.add_step(&times, std::array::from_fn(|i| self.waiting[i].1[k]));
+            }
+            self.last = Some(t);
+            self.waiting.drain(..STEP - 1);
+        } else {
+            self.count_first_waiting();
+        }
+    }
+}
+
+impl Reducing<'_> {
+    /// The first waiting sample is a line from the last one counted.
+    fn count_first_waiting(&mut self) {
+        self.waiting.remove(0);
+        if let Some((t, values)) = self.waiting.first().cloned() {
+            self.count(t, &values);
+        }
+    }
+
+    fn count(&mut self, t: f64, values: &[f64]) {
         let before = self.last.replace(t);
         self.begun.get_or_insert(t);
         for (tally, &value) in self.of.iter_mut().zip(values) {
@@ -171,6 +214,26 @@ impl Tally {
         self.last = value;
     }
 
+    /// A step with its inside, from the last sample on.
+    fn add_step(&mut self, times: &[f64], values: [f64; STEP]) {
+        let h = times[STEP - 1] - times[0];
+        for (weight, value) in WEIGHTS.iter().zip(values) {
+            self.integral += h * weight * value;
+            self.square += h * weight * value * value;
+        }
+        let quartic = Quartic::through(values);
+        let least = values.into_iter().fold(self.min, f64::min);
+        self.min = quartic.beyond(values, -1.0).map_or(least, |(_, value)| least.min(value));
+        let samples = times.iter().copied().zip(values);
+        let turn = quartic.beyond(values, 1.0).map(|(u, value)| (times[0] + 0.5 * h * (1.0 + u), value));
+        for (t, value) in samples.chain(turn) {
+            if value > self.max {
+                (self.max, self.time_of_max) = (value, t);
+            }
+        }
+        self.last = values[STEP - 1];
+    }
+
     fn of(&self, reduction: Reduction, length: f64) -> f64 {
         let mean = |integral: f64, still: f64| if length > 0.0 { integral / length } else { still };
         match reduction {
@@ -188,7 +251,10 @@ impl Tally {
 
 impl Reducing<'_> {
     /// What is kept, in the declared units.
-    pub fn finish(self) -> Vec<f64> {
+    pub fn finish(mut self) -> Vec<f64> {
+        while self.waiting.len() > 1 {
+            self.count_first_waiting();
+        }
         let length = self.last.zip(self.begun).map_or(0.0, |(end, start)| end - start);
         let mut kept = Vec::new();
         for (reducers, tally) in self.all.iter().zip(&self.of) {
@@ -209,7 +275,7 @@ mod tests {
     #[test]
     fn every_reduction_of_a_straight_line() {
         let all = [Reducers::new("x", None, Reduction::ALL.to_vec())];
-        let mut sink = Reducers::begin(&all);
+        let mut sink = Reducers::begin(&all, false);
         // From 2 down to -4 in 3 s, in steps of different length.
         for t in [0.0, 0.5, 2.0, 3.0] {
             sink.sample(t, &[2.0 - 2.0 * t]);
@@ -220,10 +286,30 @@ mod tests {
     }
 
     #[test]
+    fn steps_count_with_their_inside() {
+        let all = [Reducers::new("x", None, Reduction::ALL.to_vec())];
+        let mut sink = Reducers::begin(&all, true);
+        // 2 t - t^2 from 0 to 3: a line, a step, a jump down by 1 with a line after it.
+        let f = |t: f64| t * (2.0 - t);
+        let [a, b, c] = halfarrow_sim::inside(0.0, 2.5);
+        [0.0, a, b, c, 2.5].iter().for_each(|&t| sink.sample(t, &[f(t)]));
+        sink.sample(2.5, &[f(2.5) - 1.0]);
+        sink.sample(3.0, &[f(2.5) - 1.0]);
+        let kept = sink.finish();
+        let (mean, square) = (
+            6.25 - 2.5f64.powi(3) / 3.0 - 2.25 * 0.5,
+            4.0 / 3.0 * 2.5f64.powi(3) - 2.5f64.powi(4) + 0.2 * 2.5f64.powi(5),
+        );
+        let expected = [0.0, -2.25, -2.25, 1.0, 2.25, mean / 3.0, ((square + 0.5 * 2.25 * 2.25) / 3.0).sqrt(), 1.0];
+        kept.iter().zip(expected).for_each(|(a, b)| assert!((a - b).abs() < 1e-7, "{kept:?} is not {expected:?}"));
+        assert!((kept[3] - 1.0).abs() < 1e-14 && (kept[5] - mean / 3.0).abs() < 1e-14);
+    }
+
+    #[test]
     fn results_are_in_declared_units() {
         let mm = Unit::parse("mm").unwrap();
         let all = [Reducers::new("x", Some(mm), vec![Reduction::Max, Reduction::TimeOfMax])];
-        let mut sink = Reducers::begin(&all);
+        let mut sink = Reducers::begin(&all, true);
         sink.sample(0.0, &[0.001]);
         sink.sample(0.5, &[0.002]);
         assert_eq!(sink.finish(), [2.0, 0.5]);

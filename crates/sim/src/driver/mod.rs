@@ -8,7 +8,7 @@ mod sink;
 mod stepper;
 
 pub(crate) use grid::Grid;
-pub use grid::tick;
+pub use grid::{INSIDE, inside, tick};
 pub use position::Position;
 pub use sink::{Crawl, Nobody, Sink, Stopped, Summary};
 pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
@@ -221,6 +221,7 @@ impl<'a> Run<'a> {
         let longest = if S::DENSE { stepper.events().longest_step() } else { f64::INFINITY };
         // What would be left for the last step is divided with it.
         let latest = if stop.time - self.time <= STRETCH * longest { stop.time } else { self.time + longest };
+        let start = self.time;
         let end = match stepper.step(self.time, self.next_sample(), latest, point) {
             Ok(end) => end,
             // Where other variables have been tried already they do not help.
@@ -237,7 +238,7 @@ impl<'a> Run<'a> {
         let reason = self.arrive(&mut *stepper.events(), end, stop, crossed, point)?;
         self.report_progress()?;
         if S::DENSE {
-            self.samples_before(stepper, end)?;
+            self.samples_inside(stepper, start, end)?;
         }
         if let StopReason::TimeEvent { corner } = reason {
             stepper.before_event(corner)?;

@@ -1,8 +1,12 @@
 //! When a run is sampled and shown.
 
+use super::grid::inside;
 use super::{Grid, Run, Stepper};
 use crate::events::Events;
 use crate::{Affected, Failure};
+
+/// Steps shorter than this part of the time have no samples inside.
+const SHORT: f64 = 1e-9;
 
 /// Where samples are taken.
 pub(super) enum Samples {
@@ -47,19 +51,28 @@ impl Run<'_> {
         if let Samples::Grid(grid) = &self.samples { grid.next() } else { f64::INFINITY }
     }
 
-    /// Samples of the grid inside the last step, clearly before `end`.
-    pub(super) fn samples_before<S: Stepper>(&mut self, stepper: &mut S, end: f64) -> Result<(), Failure> {
+    /// Samples inside the last step: those of the grid, clearly before its end, or those that every step has.
+    pub(super) fn samples_inside<S: Stepper>(&mut self, stepper: &mut S, start: f64, end: f64) -> Result<(), Failure> {
+        // Of a step that is next to nothing of the time the inside is rounding.
+        if matches!(self.samples, Samples::EveryStep) && self.options.inside && end - start > SHORT * end.abs() {
+            for t in inside(start, end.min(self.to)) {
+                self.sample_inside(stepper, t)?;
+            }
+        }
         while let Samples::Grid(grid) = &self.samples
             && grid.next() + grid.slack() < end
         {
-            let t = grid.next();
-            let mut inside = std::mem::take(&mut self.inside);
-            stepper.sample(t, &mut inside);
-            let recorded = self.record(&mut *stepper.events(), t, t, &inside);
-            self.inside = inside;
-            recorded?;
+            self.sample_inside(stepper, grid.next())?;
         }
         Ok(())
+    }
+
+    fn sample_inside<S: Stepper>(&mut self, stepper: &mut S, t: f64) -> Result<(), Failure> {
+        let mut inside = std::mem::take(&mut self.inside);
+        stepper.sample(t, &mut inside);
+        let recorded = self.record(&mut *stepper.events(), t, t, &inside);
+        self.inside = inside;
+        recorded
     }
 
     /// Hands over the values at `(t, point)` as the sample of time `label`.
