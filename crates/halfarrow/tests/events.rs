@@ -587,6 +587,21 @@ fn ratios_that_leap_keep_momentum() {
     }
 }
 
+/// A source that jumps by a condition of the state, on storages that it fixes: an event, though no rate reads it.
+#[test]
+fn sources_that_jump_by_a_state_move_what_they_fix() {
+    let fixed = "model Fixed\nstate x' = 1 from 0\nSe:s(if x > 0.7 then 2 else 1) -> 0:n -> C:c(1)\nn -> R:r(1)\n";
+    let between = "model Between\n1:a -> I:ma(1, f0 = 1)\n1:b -> I:mb(3)\nstate x' = a.f from 0\na -> 0:j -> b\n\
+                   Sf:s(if x > 1 then 2 else 1) -> j\n";
+    for form in FORMS {
+        let at_end =
+            |text: &str, name: &str| *column(&trace(text, &Run { form, ..exact(1.6) }), name).last().expect("samples");
+        assert!(near(at_end(fixed, "c.q"), 2.0, 1e-12), "{form:?}");
+        // The difference of speeds grows by 1, the momentum stays.
+        assert!(near(at_end(between, "ma.f"), 0.25, 1e-9) && near(at_end(between, "mb.f"), 2.25, 1e-9), "{form:?}");
+    }
+}
+
 /// Where the law of a storage jumps, nothing pushes: what it stores is kept, with what is stored in those that move with it,
 /// in every form, in whatever order they are written, whatever makes it jump.
 #[test]

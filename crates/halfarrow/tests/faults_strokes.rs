@@ -46,6 +46,34 @@ fn element(causal: &CausalGraph, name: &str) -> ElementId {
     causal.graph.elements.iter().find(|(_, e)| e.name == name).unwrap_or_else(|| panic!("{name}")).0
 }
 
+/// What sources impose is no less forced than what the modeller forces.
+#[test]
+fn strokes_forced_against_sources_are_refused() {
+    let refused = |text: &str| {
+        let reached = to_causal_graph(Text { name: "test.bond", text, files: &NoFiles, overrides: &[] });
+        reached.err().unwrap_or_else(|| panic!("it is taken:\n{text}")).render(false)
+    };
+    for (graph, forced) in [
+        ("Sf:s(1) -> 1:a -> R:r(2)", "causality r conductive"),
+        ("Se:s(1) -> 0:a -> R:r(2)\na -> C:c(1)", "causality c integral"),
+        ("Sf:s(1) -> 1:a -> I:i(2)", "causality i integral"),
+        ("Se:s(1) -> 1:a -> R:r(1)", "stroke s -> a at s"),
+        ("Sf:s(1) -> 1:a -> GY:g(2) -> 1:b -> R:r(1)\nb -> I:i(1)", "causality i integral\ncausality r conductive"),
+    ] {
+        let said = refused(&format!("model M\n{graph}\n{forced}\n"));
+        assert!(said.contains("C003"), "{said}");
+    }
+    let alone = refused("model M\nSe:s(1) -> 0:a -> R:r(2)\na -> C:c(1)\ncausality c integral\n");
+    assert!(alone.contains("a source or constraint asks for the other one") && alone.contains("what this imposes"));
+    // Each of them can be met, both leave a junction without a stroke.
+    let both = refused(
+        "model M\n0:j0 -> 0:j1 -> 1:j2\nj0 -> 1:j3 -> GY:g4(e_out = 1.112) -> j2\nj1 -> 1:j4\nj0 -> I:i1(2.998)\n\
+         j0 -> I:i2(1.476)\nSf:s3(3.978) -> j1\nSe:s5(4.057) -> j2\nj3 -> C:c6(0.557)\nj4 -> R:r7(2.854)\n\
+         Se:s8(0.287) -> j4\ncausality i1 integral, r7 conductive\n",
+    );
+    assert!(both.contains("C003") && both.contains("at neither end"), "{both}");
+}
+
 #[test]
 fn every_port_of_a_field_has_a_state_of_its_own_name() {
     for (name, variable, expected) in [("k3const", "m.f", 0.098_675_3), ("field_coils", "M.x.f", 0.050_829_2)] {

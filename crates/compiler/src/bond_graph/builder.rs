@@ -142,6 +142,8 @@ pub(super) struct PutOff {
     what: String,
     /// Where it is asked for.
     here: Here,
+    /// Whether they may differ by a time that is not written: `x' = 1 - x` of a signal without a unit.
+    over_time: bool,
 }
 
 /// Effort and flow of a bond, with their dimensions.
@@ -172,6 +174,8 @@ pub(super) struct Builder<'a, 'f> {
     /// Where what is read stands.
     pub now: Here,
     pub faults: Faults,
+    /// What is odd and no fault.
+    pub warnings: Vec<Diagnostic>,
     /// The turns of repetitions, those of sums with them, and what shapes the model.
     pub repeats: Repeats<'a>,
     /// Whether something in the tree is missing, which the parser has said.
@@ -244,6 +248,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             exprs,
             dims: Dimensions::default(),
             units_written: false,
+            warnings: Vec::new(),
             later: None,
             now: Here::of(0),
             faults: Faults::default(),
@@ -357,12 +362,22 @@ impl<'a, 'f> Builder<'a, 'f> {
     pub fn equal(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str) {
         if let Some(later) = &mut self.later {
             let (left, right, what) = (left.clone(), right.clone(), what.to_string());
-            later.push(PutOff { left, right, span, what, here: self.now });
+            later.push(PutOff { left, right, span, what, here: self.now, over_time: false });
             return;
         }
         let reason = Reason { span, part: None };
         for clash in self.dims.equal(left, right, &reason) {
             self.clash(&clash, what, span);
+        }
+    }
+
+    /// Requires the rate of a signal and the signal over time to have one dimension. Of a signal that nobody gives a unit, and
+    /// whose rate reads it, numbers without a unit may stand for one over a time: whatever its unit is, its rate has it then.
+    pub fn equal_over_time(&mut self, rate: &Quantity, own: &Quantity, span: Span, without_unit: bool) {
+        let over_time = own.over(&Quantity::of(Dim::SECOND));
+        self.equal(rate, &over_time, span, "the rate and the signal over time");
+        if let Some(last) = self.later.as_mut().and_then(|later| later.last_mut()) {
+            last.over_time = without_unit;
         }
     }
 
@@ -375,7 +390,13 @@ impl<'a, 'f> Builder<'a, 'f> {
 
     /// Requires what was put off.
     pub fn settle_units(&mut self) {
-        for PutOff { left, right, span, what, here } in self.later.take().unwrap_or_default() {
+        let (over_time, plain): (Vec<_>, Vec<_>) =
+            self.later.take().unwrap_or_default().into_iter().partition(|put_off| put_off.over_time);
+        for PutOff { left, right, span, what, here, over_time } in plain.into_iter().chain(over_time) {
+            let hidden = Quantity::of(Dim::SECOND);
+            if over_time && self.dims.put_in(&left.over(&right)) == hidden {
+                continue;
+            }
             let before = self.faults.len();
             self.equal(&left, &right, span, &what);
             self.met_in(here, before);

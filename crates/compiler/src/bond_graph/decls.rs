@@ -14,7 +14,7 @@ use crate::ast::{self, BinaryOp, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::span::Span;
-use crate::unit::{Dimension as Dim, Unit};
+use crate::unit::Unit;
 
 /// How far a declaration has got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -445,8 +445,28 @@ impl<'a> Builder<'a, '_> {
         if value.quantity == Quantity::Any && self.exprs.symbols_of(value.expr).is_empty() {
             return self.in_unit(value.expr, &scale);
         }
+        if value.quantity == Quantity::Any
+            && let Some(unit) = &scale.unit
+        {
+            self.plain_numbers(value.expr, unit, span);
+        }
         self.equal(&value.quantity, &Quantity::of(scale.dim), span, "the value and its unit");
         Value { quantity: Quantity::of(scale.dim), ..value }
+    }
+
+    /// Numbers without a unit are SI, and stand where the unit is another one: who writes `if late then 5 else 3 : kN` may
+    /// mean 5 kN.
+    pub fn plain_numbers(&mut self, value: Expr, unit: &Unit, span: Span) {
+        if unit.is_si() || self.exprs.is_zero(value) {
+            return;
+        }
+        let si = unit.dimension;
+        let title = format!("the numbers here are in {si}, not in {unit}");
+        let warning = Diagnostic::warning(codes::U008, title, span, "none of them has a unit");
+        self.warnings.push(warning.hint(format!(
+            "write the unit with the numbers, as in `5 {unit}`; a unit behind `:` counts for a single number only, else it says in \
+             what results are told"
+        )));
     }
 
     /// The value of an override has the dimension of what it replaces; without a unit it is SI.
@@ -569,13 +589,16 @@ impl<'a> Builder<'a, '_> {
     fn make_rate(&mut self, open: &OpenSignal<'a>) {
         let cx = self.flat.names.decls[open.decl].reading();
         let own = self.quantity(self.signals[open.id].symbol);
-        if let Some(rate) = self.number(&cx, &open.state.rate) {
-            let per_second = own.over(&Quantity::of(Dim::SECOND));
-            self.equal(&rate.quantity, &per_second, open.state.rate.span, "the rate and the signal over time");
+        let rate = self.number(&cx, &open.state.rate);
+        let start = open.state.start.as_ref().and_then(|start| Some((start, self.number(&cx, start)?)));
+        if let Some(rate) = rate {
+            let symbol = self.signals[open.id].symbol;
+            let plain = start.as_ref().is_none_or(|(_, value)| value.quantity == Quantity::Any);
+            let without_unit = plain && open.state.unit.is_none() && self.exprs.depends_on(rate.expr, symbol);
+            self.equal_over_time(&rate.quantity, &own, open.state.rate.span, without_unit);
             self.signals[open.id].rate = Some(rate.expr);
         }
-        let Some(start) = &open.state.start else { return };
-        if let Some(value) = self.number(&cx, start)
+        if let Some((start, value)) = start
             && self.only_parameters(value.expr, start.span, "a start value")
         {
             let value = self.with_unit(value, open.state.unit.as_ref(), start.span);

@@ -135,6 +135,7 @@ fn build(
     b.repeats.add_uses(&flat.names, &mut b.uses);
     let (faults, uses) = (std::mem::take(&mut b.faults), std::mem::take(&mut b.uses));
     let mut faults = faults.into_list();
+    faults.append(&mut b.warnings);
     let finished = finished(b, title, kinds, (asked, clauses, shapes), &relations, &rates);
     let graph = finished.map(|(graph, unstarted)| {
         faults.extend(unstarted.iter().filter_map(|signal| signal.warning(&graph)));

@@ -12,7 +12,7 @@ use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 use crate::span::Span;
-use crate::unit::Dimension as Dim;
+use crate::unit::{Dimension as Dim, Unit};
 
 impl<'a> Builder<'a, '_> {
     /// All `when` statements.
@@ -100,6 +100,11 @@ impl<'a> Builder<'a, '_> {
         let symbol = self.changed(&own, action)?;
         let value = self.number(cx, &action.value)?;
         self.equal(&value.quantity, &own.quantity, action.span, "the new value and the variable");
+        if value.quantity == Quantity::Any
+            && let Some(unit) = self.declared_unit(symbol)
+        {
+            self.plain_numbers(value.expr, &unit, action.value.span);
+        }
         let name = format!("{}{}", self.flat.names.scopes[cx.here.scope].prefix, self.written(cx.here, &action.target));
         let impulse = match self.meaning(symbol) {
             Some(Meaning::Signal(_) | Meaning::Held(_)) => None,
@@ -112,6 +117,15 @@ impl<'a> Builder<'a, '_> {
     }
 
     /// The variable that tells the impulse of a law.
+    /// The unit that a discrete variable or state is declared with.
+    fn declared_unit(&self, symbol: Symbol) -> Option<Unit> {
+        match self.meaning(symbol)? {
+            Meaning::Held(id) => self.held[id].unit.clone(),
+            Meaning::Signal(id) => self.signals[id].unit.clone(),
+            _ => None,
+        }
+    }
+
     pub(super) fn impulse_of(&mut self, name: &str, target: Symbol, span: Span) -> Symbol {
         self.impulse(name, target, span, &mut BTreeMap::new())
     }

@@ -254,6 +254,10 @@ impl ConnectedPart<'_> {
         if !(forced && drawn) {
             strokes.undo(mark);
             draw_truth(graph, strokes, members, &solved);
+            // What is undetermined has no stroke in any case.
+            if forced && solved.undetermined.is_empty() && !strokes.is_complete(members) {
+                return Err(vec![contradiction::leaves_no_way(graph, members)]);
+            }
         } else if !solved.virtual_speeds.is_empty() {
             self.draw_kept_if_allowed(strokes, mark, &solved);
         }

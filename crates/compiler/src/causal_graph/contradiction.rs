@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::assign::{imposes, outer_ports};
 use super::ports::Solved;
 use super::strokes::{Strokes, sits_here};
 use super::{CausalGraph, Combination, Role};
@@ -12,12 +13,14 @@ use crate::ids::Id;
 use crate::ids::Map;
 use crate::span::Span;
 
-/// One demand of the modeller on a stroke.
+/// One demand on a stroke.
 #[derive(Debug, Clone, Copy)]
 struct Demand {
     bond: BondId,
     at_to: bool,
     span: Span,
+    /// Whether what an element imposes makes it, not the modeller.
+    imposed: bool,
 }
 
 /// Whether `stroke` or `causality` says anything about a part.
@@ -27,19 +30,26 @@ pub fn is_forced(graph: &BondGraph, members: &[ElementId]) -> bool {
 
 /// Applies `stroke` and `causality` to one part; tells whether there were any. On conflict the smallest set is reported.
 pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[ElementId]) -> Result<bool, Box<Diagnostic>> {
-    let demands = demands_on(graph, members);
-    let mark = strokes.mark();
-    if demands.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok()) {
-        return Ok(!demands.is_empty());
+    let forced = demands_on(graph, members);
+    if forced.is_empty() {
+        return Ok(false);
     }
-    strokes.undo(mark);
+    let mark = strokes.mark();
     let holds = |set: &[Demand], strokes: &mut Strokes| {
         let fine = set.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok());
         strokes.undo(mark);
         fine
     };
+    // Sources that contradict each other without any forced stroke are told by what they impose.
+    let mut core = imposed_on(graph, members);
+    if !holds(&core, strokes) {
+        core.clear();
+    }
+    core.extend(forced.iter().copied());
+    if holds(&core, strokes) {
+        return Ok(forced.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok()));
+    }
     // A minimal infeasible subset: drop each demand without which the rest is still contradictory.
-    let mut core = demands;
     let mut i = 0;
     while i < core.len() {
         let mut fewer = core.clone();
@@ -51,19 +61,38 @@ pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[Elemen
         let name = |p: PortRef| graph.elements[p.element].name.clone();
         format!("{} -> {}", name(bond.from), name(bond.to))
     };
+    // What the modeller has forced comes first.
+    core.sort_by_key(|demand| demand.imposed);
     let Some(first) = core.first() else { unreachable!("an empty set contradicts nothing") };
-    let mut fault = Diagnostic::error(
-        codes::C003,
-        "these forced strokes cannot hold together",
-        first.span,
-        format!("this settles the stroke of {}", bond(first)),
-    );
+    let title = match core.iter().filter(|demand| !demand.imposed).count() {
+        1 => "this forced stroke cannot be: a source or constraint asks for the other one",
+        _ => "these forced strokes cannot hold together",
+    };
+    let mut fault =
+        Diagnostic::error(codes::C003, title, first.span, format!("this settles the stroke of {}", bond(first)));
     for other in &core[1..] {
-        fault = fault.also(other.span, format!("this settles the stroke of {}", bond(other)));
+        let what = if other.imposed { "what this imposes" } else { "this" };
+        fault = fault.also(other.span, format!("{what} settles the stroke of {}", bond(other)));
     }
     Err(Box::new(fault
         .note("one bond sets the effort of a 0-junction, one sets the flow of a 1-junction; a TF passes causality on, a GY turns it")
-        .hint("leave out one of them")))
+        .hint(if core.iter().any(|demand| demand.imposed) { "leave out what is forced" } else { "leave out one of them" })))
+}
+
+/// What is forced can be met, and leaves bonds whose stroke can then sit at neither end.
+pub fn leaves_no_way(graph: &BondGraph, members: &[ElementId]) -> Diagnostic {
+    let demands = demands_on(graph, members);
+    let span = demands.first().map_or(graph.elements[members[0]].span, |demand| demand.span);
+    let mut fault = Diagnostic::error(
+        codes::C003,
+        "with what is forced here some bonds can have their stroke at neither end",
+        span,
+        "this settles a stroke",
+    );
+    for other in demands.iter().skip(1) {
+        fault = fault.also(other.span, "this settles a stroke");
+    }
+    fault.hint("leave out one of them, or turn it round")
 }
 
 fn demands_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {
@@ -74,15 +103,25 @@ fn demands_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {
             let port = &graph.elements[forced.port.element].ports[forced.port.port as usize];
             let inertance = matches!(graph.elements[forced.port.element].kind, Kind::Inertance(_));
             let here = sits_here(forced.causality, inertance);
-            demands.push(Demand { bond: port.bond, at_to: here == port.inward, span: forced.span });
+            demands.push(Demand { bond: port.bond, at_to: here == port.inward, span: forced.span, imposed: false });
         }
     }
     for forced in &graph.forced_strokes {
         if inside(graph.bonds[forced.bond].from.element) {
-            demands.push(Demand { bond: forced.bond, at_to: forced.at_to, span: forced.span });
+            demands.push(Demand { bond: forced.bond, at_to: forced.at_to, span: forced.span, imposed: false });
         }
     }
     demands
+}
+
+/// The strokes that sources and constraints ask for by what they impose.
+fn imposed_on(graph: &BondGraph, members: &[ElementId]) -> Vec<Demand> {
+    let demand = |port: PortRef| {
+        let (effort, element) = (imposes(graph, port)?, &graph.elements[port.element]);
+        let end = &element.ports[port.port as usize];
+        Some(Demand { bond: end.bond, at_to: effort != end.inward, span: element.span, imposed: true })
+    };
+    outer_ports(graph, members).into_iter().filter_map(demand).collect()
 }
 
 /// Errors for relations among imposed variables that the structure implies and that do not hold.

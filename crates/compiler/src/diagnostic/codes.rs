@@ -52,6 +52,7 @@ codes! {
     U005 "elements of different domains on one junction structure";
     U006 "a quantity with a unit where a number is needed";
     U007 "a stiffness where a compliance belongs, or the like";
+    U008 "numbers without a unit where another than the SI unit is declared (warning)";
     N001 "an unknown name";
     N002 "a name declared twice";
     N003 "a name that the language keeps for itself";

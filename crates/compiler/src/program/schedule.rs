@@ -22,6 +22,7 @@ use crate::equations::{self, EquationStep, Equations, LinearBlock, NewtonBlock};
 use crate::ids::{Id, Table};
 use crate::sparse::SparseMatrix;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The program that evaluates the equations.
@@ -309,7 +310,8 @@ impl Schedule<'_> {
         let graph = self.graph;
         let states = self.states(equations);
         let implicit = implicit(&self.lower, equations);
-        let variables = graph.variables.keys().filter_map(|&s| Some((s, self.lower.defined(s)?))).collect();
+        let variables: BTreeMap<Symbol, Value> =
+            graph.variables.keys().filter_map(|&s| Some((s, self.lower.defined(s)?))).collect();
         let momenta = equations.momenta.iter().map(|m| (m.speed, self.lower.value(m.sum))).collect();
         let inputs = self.inputs();
         let held = self.held();
@@ -344,7 +346,8 @@ impl Schedule<'_> {
         let becomes = clauses.iter().filter(|c| matches!(c.trigger, Trigger::Becomes(_))).map(|c| c.trigger.value());
         let leaps = jumps.iter().filter(|jumps| jumps.leaps).flat_map(events::Jumps::values);
         let sources = held.iter().map(|h| h.source);
-        let integrated = rates.iter().copied().chain(sources).chain(becomes).chain(leaps).collect();
+        let stored = stored(graph).filter_map(|s| variables.get(&s).copied());
+        let integrated = rates.iter().copied().chain(sources).chain(becomes).chain(leaps).chain(stored).collect();
         let program = Program {
             name: graph.name.clone(),
             kept: kept(flow, equations, &momenta),
@@ -455,6 +458,11 @@ impl Schedule<'_> {
 struct Vanishing {
     residual: Value,
     asked: Value,
+}
+
+/// What storages hold: where it jumps is an event, also if it is given and no rate reads it.
+fn stored(graph: &BondGraph) -> impl Iterator<Item = Symbol> + '_ {
+    graph.variables.iter().filter(|(_, v)| matches!(v.meaning, Meaning::Stored(_))).map(|(&symbol, _)| symbol)
 }
 
 /// Start conditions with what they read.
