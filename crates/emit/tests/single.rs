@@ -88,7 +88,8 @@ fn floats_follow_the_interpreter() {
     // Those with repetition, with events, with ratios that leap, and later ones last: each model keeps the method that it has
     // had.
     let has = |path: &PathBuf, what: &str| fs::read_to_string(path).expect("a model").contains(what);
-    let later = ["operating_points", "flat_start", "ladder_of_four", "driven_orifice", "levels", "pulse_width"];
+    let later =
+        ["operating_points", "flat_start", "ladder_of_four", "driven_orifice", "levels", "pulse_width", "when_gearbox"];
     let came = |path: &PathBuf| later.iter().position(|name| path.file_stem().is_some_and(|stem| stem == *name));
     let mut ordered = models();
     let kind = |path: &PathBuf| (has(path, "Ratios that leap"), has(path, "\nwhen "), has(path, "for i in "));

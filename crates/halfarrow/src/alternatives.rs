@@ -6,6 +6,7 @@ use std::sync::Arc;
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::bond_graph::{BondGraph, Kind, Named, Preference};
 use halfarrow_compiler::causal_graph::assign_causality;
+use halfarrow_compiler::diagnostic::Diagnostics;
 use halfarrow_compiler::equations::{Equations, Form, derive_equations, derive_minimal};
 use halfarrow_compiler::ids::Map;
 use halfarrow_compiler::program::{Program, schedule};
@@ -47,6 +48,11 @@ impl Alternatives {
     }
 }
 
+/// What is said first, in a line.
+fn first(faults: &Diagnostics) -> String {
+    faults.0.first().map_or_else(String::new, |fault| format!("{}: {}", fault.title, fault.primary.text))
+}
+
 impl exec::Alternatives for Alternatives {
     fn most_states(&self) -> Option<usize> {
         if !self.form.is_explicit() {
@@ -59,7 +65,12 @@ impl exec::Alternatives for Alternatives {
         Some(ports.sum::<usize>() + self.graph.signals.len())
     }
 
-    fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program> {
+    fn program(
+        &self,
+        branches: &[u32],
+        independent: &[Symbol],
+        point: &BTreeMap<Symbol, f64>,
+    ) -> Result<Program, String> {
         let mut graph = match branches.is_empty() {
             true => BondGraph::clone(&self.graph),
             false => self.graph.in_mode(&branches.iter().map(|&b| b as usize).collect::<Vec<_>>()),
@@ -74,11 +85,11 @@ impl exec::Alternatives for Alternatives {
         if !point.is_empty() {
             graph.point = Some(point.iter().map(|(&symbol, &value)| (symbol, value)).collect::<Map<_, _>>());
         }
-        let causal = assign_causality(&graph).ok()?;
+        let causal = assign_causality(&graph).map_err(|faults| first(&faults))?;
         let equations = match (self.form, branches.is_empty()) {
-            (Form::Minimal, true) => derive_minimal(&causal, self.conserved).ok()?,
-            (form, _) => derive_equations(&causal, form).ok()?,
+            (Form::Minimal, true) => derive_minimal(&causal, self.conserved),
+            (form, _) => derive_equations(&causal, form),
         };
-        Some(schedule(&equations))
+        Ok(schedule(&equations.map_err(|faults| first(&faults))?))
     }
 }

@@ -52,6 +52,7 @@ mod loops;
 mod model;
 mod modes;
 mod names;
+mod objective;
 mod pieces;
 mod quantity;
 #[cfg(feature = "real_time")]

@@ -143,7 +143,8 @@ impl AuditReport {
         let beyond = self.beyond(made);
         let verdict = beyond.iter().map(|b| b.verdict).max().unwrap_or_default();
         let mut by_remedy: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-        for b in &beyond {
+        // What is no number is what has stopped the run, or why it is refused.
+        for b in beyond.iter().filter(|b| !(b.miss.value.is_nan() && b.verdict == Verdict::Refused)) {
             let Deviation { place, value, time, .. } = b.miss;
             by_remedy.entry(&b.remedy).or_default().push(format!("{place} is missed by {value:.0e} at t = {time} s"));
         }

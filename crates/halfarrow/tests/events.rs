@@ -444,6 +444,29 @@ from -> TF:wheels(e_out = if gear > 2 then 1.4 else 3.6) -> 1:to -> I:load(2)
     }
 }
 
+/// Between the gears a ratio leads through others, which no gear change meets: momenta are shared out by the new one at once,
+/// also while the motor pulls.
+#[test]
+fn a_gear_change_knows_no_gears_between() {
+    for pull in [0.0, 0.5] {
+        let text = format!(
+            "model Gearbox\ndiscrete gear = 1\nwhen t > 1 {{ gear = 3 }}\n\
+             let second = if gear > 2 then 1 else (if gear < 1 then 0 else gear - 1)\n\
+             let third = if gear > 3 then 1 else (if gear < 2 then 0 else gear - 2)\n\
+             1:from -> I:rotor(0.5, f0 = 36)\nSe:pull({pull}) -> from\n\
+             from -> TF:wheels(e_out = 3.6 - 1.5*second - 0.7*third) -> 1:to -> I:load(2)\n"
+        );
+        // N^T (p+ - p-) = 0 with the ratio after it, between times in which the motor pulls both.
+        let before = 36.0 + pull / (0.5 + 2.0 / (3.6 * 3.6));
+        let after = (0.5 * before + 2.0 * before / 3.6 / 1.4) / (0.5 + 2.0 / 1.96);
+        let wanted = after + pull / (0.5 + 2.0 / 1.96);
+        for form in FORMS {
+            let found = *column(&trace(&text, &Run { form, ..exact(2.0) }), "rotor.f").last().expect("samples");
+            assert!(near(found, wanted, 1e-8), "{form:?} {pull}: {found} {wanted}");
+        }
+    }
+}
+
 #[test]
 fn events_stand_in_instances_and_repetitions() {
     let text = "model Many

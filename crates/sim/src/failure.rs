@@ -155,6 +155,8 @@ pub enum Failure {
         what: String,
         /// How many modes were tried, and in how many of them no branch holds for long; the others have no equations.
         tried: [usize; 2],
+        /// Why one of these modes has no equations.
+        why: Option<String>,
     },
     /// A form has no equations that go on in the mode of set-valued laws that holds from here on.
     NoForm {
@@ -386,7 +388,7 @@ impl fmt::Display for Failure {
             Failure::NoForm { time, mode, reason } => {
                 write!(f, "from t = {time} s on {mode}: {reason}; another form may go on there, minimal does")
             }
-            Failure::NoMode { time, what, tried: [tried, ended] } => {
+            Failure::NoMode { time, what, tried: [tried, ended], why } => {
                 write!(
                     f,
                     "at t = {time} s {what} ends, and no branches of the set-valued laws hold together beyond that: "
@@ -396,10 +398,11 @@ impl fmt::Display for Failure {
                     "of {tried} modes tried, in {ended} a branch ends at once, and {} have no equations",
                     tried.saturating_sub(*ended)
                 )?;
-                f.write_str(
-                    " (sources joined with nothing between them, a flow with nowhere to go); give what has to yield a \
-                     resistance or an inertance, and friction no effort below 0",
-                )
+                match why {
+                    Some(why) => write!(f, " ({why})")?,
+                    None => f.write_str(" (sources joined with nothing between them, a flow with nowhere to go)")?,
+                }
+                f.write_str("; give what has to yield a resistance or an inertance, and friction no effort below 0")
             }
             Failure::Overlap { time, what, gap } => write!(
                 f,

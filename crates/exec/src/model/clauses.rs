@@ -425,18 +425,26 @@ impl Model {
         self.take_stored(t, x)?;
         self.take_misses(t, x)?;
         let sums = if code.impulses.is_none() { self.sums(t, x)? } else { Vec::new() };
-        let work = std::mem::take(&mut self.events);
+        let (work, mut set) = (std::mem::take(&mut self.events), false);
         for (_, at, action) in Model::actions(&code, &work) {
             self.vary_change(action.target, at);
             match action.target {
                 Target::Discrete(i) => {
-                    self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at])
+                    self.run.delays_and_samples[i as usize] = DelayOrSample::Discrete(work.values[at]);
+                    set = true;
                 }
-                Target::Signal(i) => x[i as usize] = work.values[at],
+                Target::Signal(i) => {
+                    x[i as usize] = work.values[at];
+                    set = true;
+                }
                 Target::Moved { .. } | Target::HeldByBranch => {}
             }
         }
         self.events = work;
+        // What storages keep is shared out by the ratios that hold from now on, not by those of conditions that have changed.
+        if set {
+            self.take_signs(t, x)?;
+        }
         match code.impulses {
             Some(_) => self.balance_impulses(t, x, first)?,
             None => _ = self.conserve_sums(t, x, &sums)?,

@@ -23,7 +23,12 @@ pub struct ModeId(pub u32);
 pub trait Alternatives: std::fmt::Debug + Send + Sync {
     /// The program in which set-valued laws have these branches and these variables stay independent, as far as they can,
     /// decided at these values of the variables of the graph. `None` if there is none.
-    fn program(&self, branches: &[u32], independent: &[Symbol], point: &BTreeMap<Symbol, f64>) -> Option<Program>;
+    fn program(
+        &self,
+        branches: &[u32],
+        independent: &[Symbol],
+        point: &BTreeMap<Symbol, f64>,
+    ) -> Result<Program, String>;
 
     /// How many states a mode has at most: all of them are given so many. `None`: each mode has its own number of unknowns.
     fn most_states(&self) -> Option<usize>;
@@ -48,6 +53,8 @@ struct Others {
     of: BTreeMap<Key, Option<ModeId>>,
     /// Determinants of the equations of computed positions where a mode was entered first, as logarithms.
     determinants: BTreeMap<ModeId, Vec<f64>>,
+    /// Why these branches have no equations.
+    without: BTreeMap<Vec<u32>, String>,
 }
 
 /// What a mode is looked up by.
@@ -134,7 +141,7 @@ impl Compiled {
         independent: Vec<Symbol>,
     ) -> Option<ModeId> {
         let branches = present.program.branches();
-        let program = self.fitting(self.alternatives.as_ref()?.program(&branches, &independent, point))?;
+        let program = self.fitting(self.alternatives.as_ref()?.program(&branches, &independent, point).ok())?;
         if program.tracked == present.program.tracked {
             return None;
         }
@@ -177,8 +184,20 @@ impl Compiled {
         if let Some(known) = self.others().of.get(&key) {
             return *known;
         }
-        let program = self.fitting(self.alternatives.as_ref()?.program(&key.branches, &key.independent, point));
+        let program = self.alternatives.as_ref()?.program(&key.branches, &key.independent, point);
+        if let Err(why) = &program {
+            self.others().without.insert(key.branches.clone(), why.clone());
+        }
+        let program = self.fitting(program.ok());
         self.added(key, program)
+    }
+
+    /// Why some branches of set-valued laws have no equations, of those that differ least from these.
+    pub(super) fn why_without(&self, present: &[u32]) -> Option<(Vec<u32>, String)> {
+        let others = self.others();
+        let apart = |branches: &[u32]| branches.iter().zip(present).filter(|(a, b)| a != b).count();
+        let nearest = others.without.iter().min_by_key(|(branches, _)| apart(branches));
+        nearest.map(|(branches, why)| (branches.clone(), why.clone()))
     }
 
     /// A program with as many states as all modes have; `None` if it does not fit.

@@ -172,7 +172,14 @@ impl Model {
         };
         let mut what: Vec<String> = ended.iter().map(name).collect();
         what.dedup();
-        Failure::NoMode { time, what: what.join(", "), tried }
+        let without = self.compiled.why_without(&self.code.program.branches());
+        let why = without.map(|(branches, why)| {
+            let all = laws.iter().zip(branches).filter(|(law, branch)| law.present != *branch);
+            let mode: Vec<String> =
+                all.map(|(law, branch)| format!("{} is `{}`", law.name, law.branches[branch as usize])).collect();
+            format!("where {}, {why}", mode.join(" and "))
+        });
+        Failure::NoMode { time, what: what.join(", "), tried, why }
     }
 
     /// Makes all modes that set-valued laws can have, so that none is made while a run goes on, if they are no more than `most`:
@@ -275,7 +282,7 @@ impl Model {
         };
         if entered.is_none_or(|leap| leap > NO_LEAP) {
             let what = "what is stuck or in contact there".to_string();
-            return Err(Failure::NoMode { time: t, what, tried: [1, 0] });
+            return Err(Failure::NoMode { time: t, what, tried: [1, 0], why: None });
         }
         for (clause, fired) in code.program.clauses.iter().zip(fired).filter(|(_, fired)| *fired) {
             let same = |c: &&Clause| match (c.bound, clause.bound) {

@@ -296,10 +296,8 @@ mod tests {
         sink.sample(2.5, &[f(2.5) - 1.0]);
         sink.sample(3.0, &[f(2.5) - 1.0]);
         let kept = sink.finish();
-        let (mean, square) = (
-            6.25 - 2.5f64.powi(3) / 3.0 - 2.25 * 0.5,
-            4.0 / 3.0 * 2.5f64.powi(3) - 2.5f64.powi(4) + 0.2 * 2.5f64.powi(5),
-        );
+        let (mean, square): (f64, f64) =
+            (6.25 - 15.625 / 3.0 - 2.25 * 0.5, 4.0 / 3.0 * 15.625 - 39.0625 + 0.2 * 97.65625);
         let expected = [0.0, -2.25, -2.25, 1.0, 2.25, mean / 3.0, ((square + 0.5 * 2.25 * 2.25) / 3.0).sqrt(), 1.0];
         kept.iter().zip(expected).for_each(|(a, b)| assert!((a - b).abs() < 1e-7, "{kept:?} is not {expected:?}"));
         assert!((kept[3] - 1.0).abs() < 1e-14 && (kept[5] - mean / 3.0).abs() < 1e-14);

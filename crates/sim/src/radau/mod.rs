@@ -39,6 +39,9 @@ const FAST: f64 = 1e-3;
 /// A step this little longer than planned is made rather than one more.
 const STRETCH: f64 = 1.0001;
 
+/// Errors beyond this part of what is allowed are looked at for rounding: they would keep steps from growing.
+const TOLD: f64 = 0.03;
+
 /// What the method did, beside steps and residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct RadauCounts {
@@ -101,6 +104,10 @@ pub(crate) struct Radau {
     dyp: Vec<f64>,
     /// For each equation how much the values allowed of its unknowns, and the rates of these, make of it in a step.
     rates_of_change: Vec<[f64; 2]>,
+    /// What roundings make of each unknown of a step; room for what each equation adds up, and for what one of it moves.
+    noise: Vec<f64>,
+    sums: Vec<f64>,
+    moved: Vec<f64>,
     /// Whether rates are known to enter linearly.
     linear_in_rates: bool,
     /// Whether the first step goes along the rates at its start.
@@ -162,6 +169,9 @@ impl Radau {
             allowed: vector(),
             wanted: (0..size).any(|unknown| system.index(unknown) > 1).then(vector),
             rates_of_change: vec![[0.0; 2]; size],
+            noise: vector(),
+            sums: vector(),
+            moved: vector(),
             dy: vec![0.0; nonzeros],
             dyp: vec![0.0; nonzeros],
             linear_in_rates: system.semi_explicit().is_some(),
@@ -465,8 +475,15 @@ impl Radau {
         }
         self.error.iter_mut().for_each(|error| *error = -*error);
         self.matrices.solve_real(&mut self.error);
-        let norm = norm(&[&self.error], &self.allowed);
-        if norm.is_nan() { f64::INFINITY } else { norm.max(1e-10) }
+        let mut size = norm(&[&self.error], &self.allowed);
+        if size > TOLD {
+            // What rounding alone makes of an unknown that is nothing is no error of the step.
+            self.take_noise(system);
+            let told = |(error, noise): (&mut f64, &f64)| *error = if error.abs() <= *noise { 0.0 } else { *error };
+            self.error.iter_mut().zip(&self.noise).for_each(told);
+            size = norm(&[&self.error], &self.allowed);
+        }
+        if size.is_nan() { f64::INFINITY } else { size.max(1e-10) }
     }
 
     /// Moves to the end of the step, with `next` for the next one.

@@ -13,6 +13,9 @@ const STALLED: f64 = 0.3;
 /// What a correction may be of the unknowns by rounding alone.
 const ROUNDING: f64 = f64::EPSILON;
 
+/// Roundings of all that an equation adds up that a correction may be made of.
+const NOISE: f64 = 8.0;
+
 /// Rate of convergence beyond which there is none.
 const DIVERGENT: f64 = 0.99;
 
@@ -60,7 +63,13 @@ impl Radau {
                 let growth = size / before;
                 self.newton.rate = if iteration == 2 { growth } else { (growth * growth_before).sqrt() };
                 growth_before = growth;
-                self.predict_convergence(size, MOST_ITERATIONS - 1 - iteration)?;
+                if let Err(slow) = self.predict_convergence(size, MOST_ITERATIONS - 1 - iteration) {
+                    if !self.is_rounding(system) {
+                        return Err(slow);
+                    }
+                    self.apply();
+                    return Ok(iteration);
+                }
             }
             if !size.is_finite() {
                 return Err(StepError::Slow { shorten: 0.5 });
@@ -77,7 +86,36 @@ impl Radau {
             }
             wanted_before = wanted;
         }
-        Err(StepError::Slow { shorten: 0.5 })
+        // The last correction has been applied.
+        if self.is_rounding(system) { Ok(MOST_ITERATIONS) } else { Err(StepError::Slow { shorten: 0.5 }) }
+    }
+
+    /// Whether the correction is no more than what roundings of the equations make of it. The flow of a capacitor that a source
+    /// holds is the difference of two charges over the step: what rounding leaves of it may be large beside nothing at all.
+    fn is_rounding(&mut self, system: &dyn ImplicitSystem) -> bool {
+        self.take_noise(system);
+        let fits = |(i, correction): (usize, &f64)| {
+            correction.abs() <= self.noise[i].max(self.newton_tolerance * self.allowed[i])
+        };
+        self.correction.iter().all(|part| part.iter().enumerate().all(fits))
+    }
+
+    /// Computes what roundings of the equations at the trial values make of each unknown of a step.
+    pub(super) fn take_noise(&mut self, system: &dyn ImplicitSystem) {
+        let Radau { noise, sums, moved, matrices, .. } = self;
+        sums.fill(0.0);
+        for (place, (row, column)) in system.sparsity().entries().enumerate() {
+            sums[row] +=
+                (self.dy[place] * self.trial[column]).abs() + (self.dyp[place] * self.trial_rates[column]).abs();
+        }
+        noise.fill(0.0);
+        for turn in [false, true] {
+            let signed = |(row, sum): (usize, &f64)| if turn && row % 2 == 1 { -sum } else { *sum };
+            moved.iter_mut().zip(sums.iter().enumerate().map(signed)).for_each(|(moved, sum)| *moved = sum);
+            matrices.solve_real(moved);
+            let part = |moved: &f64| NOISE * f64::EPSILON * moved.abs();
+            noise.iter_mut().zip(&*moved).for_each(|(noise, moved)| *noise = noise.max(part(moved)));
+        }
     }
 
     /// Whether the rate of an unknown would change by far more in the step than by its own tolerance, if only what the Jacobian

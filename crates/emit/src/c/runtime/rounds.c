@@ -122,6 +122,9 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     int status = $MODEL_OK;
     int i;
     int a;
+//if switches
+    int set = 0;
+//end
 //if impulses
 //if held
     $ha_place(m, t);
@@ -143,6 +146,9 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     for (i = 0; i < $CLAUSES; ++i) {
         for (a = $ha_action_starts[i]; m->clauses[i].fired && a < $ha_action_starts[i + 1]; ++a) {
             const int place = $ha_action_places[a];
+//if switches
+            set = set || $ha_action_kinds[a] == HA_DISCRETE || $ha_action_kinds[a] == HA_SIGNAL;
+//end
             if ($ha_action_kinds[a] == HA_DISCRETE) {
                 m->z[place] = m->new_values[a];
             } else if ($ha_action_kinds[a] == HA_SIGNAL) {
@@ -153,6 +159,15 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
             }
         }
     }
+//if switches
+    /* What storages keep is shared out by the ratios that hold from now on, not by those of conditions that have changed. */
+    if (set) {
+        status = $ha_take_sides(m, t, x);
+        if (status != $MODEL_OK) {
+            return status;
+        }
+    }
+//end
 //if impulses
     status = $ha_balance_impulses(m, t, x, first);
     if (status != $MODEL_OK) {
