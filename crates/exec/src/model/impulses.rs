@@ -397,7 +397,7 @@ impl Model {
         for _ in 0..ITERATIONS {
             self.balanced(t, x, balance, work)?;
             // What is nothing but rounding never settles; then its equations hold to that.
-            met = work.met_to(0.0) || held && stays && work.met_to(ROUNDING);
+            met = work.met_to(0.0) || stays && work.met_to(ROUNDING);
             if met {
                 break;
             }

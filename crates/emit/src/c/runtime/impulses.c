@@ -369,9 +369,7 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
     int iteration;
     int status;
     int i;
-//if bounds
     int stays = 0;
-//end
     *independent = 1;
 //if bounds
     for (i = 0; i < HA_UNKNOWNS; ++i) {
@@ -400,13 +398,11 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
         for (i = 0; i < rows; ++i) {
             met = met && m->jump_residual[i] == $0.0;
         }
-//if bounds
         /* What is nothing but rounding never settles; then its equations hold to that. */
         for (i = 0; i < rows && stays; ++i) {
-            stays = $fabs(m->jump_residual[i]) <= $HA_CLOSE * m->jump_sizes[i];
+            stays = $fabs(m->jump_residual[i]) <= $1e-11 * m->jump_sizes[i];
         }
         met = met || stays;
-//end
         if (met) {
             break;
         }
@@ -420,9 +416,7 @@ static int ha_solve_impulses(ha_model *m, double t, $real *x, int *independent)
         }
         length = $ha_move_unknowns(m, x);
         met = length <= $4.0 * $DBL_EPSILON || (length < $CLOSE_TO_ROUNDING && length >= $0.5 * last);
-//if bounds
         stays = length >= $0.5 * last;
-//end
         last = length;
     }
     if (columns > 0) {
