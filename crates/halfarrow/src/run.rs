@@ -289,6 +289,9 @@ fn judged(outcome: Result<Simulated, Error>, made: &Made) -> Result<Simulated, E
             Ok(done)
         }
         Err(Error::Run(mut stopped)) => {
+            if matches!(stopped.failure, Failure::OutOfDomain { .. }) {
+                stopped.report.audit.forget_what_is_no_number();
+            }
             stopped.report.audit.judge(made);
             stopped.report.take_notes();
             Err(Error::Run(stopped))

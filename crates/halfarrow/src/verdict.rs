@@ -143,14 +143,20 @@ impl AuditReport {
         let beyond = self.beyond(made);
         let verdict = beyond.iter().map(|b| b.verdict).max().unwrap_or_default();
         let mut by_remedy: BTreeMap<&str, Vec<String>> = BTreeMap::new();
-        // What is no number is what has stopped the run, or why it is refused.
-        for b in beyond.iter().filter(|b| !(b.miss.value.is_nan() && b.verdict == Verdict::Refused)) {
+        for b in &beyond {
             let Deviation { place, value, time, .. } = b.miss;
             by_remedy.entry(&b.remedy).or_default().push(format!("{place} is missed by {value:.0e} at t = {time} s"));
         }
         let said = |(remedy, misses): (&str, Vec<String>)| format!("audit: {}: {remedy}", misses.join("; "));
         let warnings = by_remedy.into_iter().map(said).collect();
         (self.verdict, self.warnings) = (verdict, warnings);
+    }
+
+    /// Forgets what has no number: of a run that has stopped where a law has no value this is what it says already.
+    pub(crate) fn forget_what_is_no_number(&mut self) {
+        for miss in [&mut self.power, &mut self.energy, &mut self.residual, &mut self.rates] {
+            miss.take_if(|miss| miss.value.is_nan());
+        }
     }
 
     /// Why the result is not to be used, if it is not.

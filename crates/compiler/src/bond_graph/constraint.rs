@@ -13,7 +13,7 @@ use super::flatten::Held;
 use super::structure::Structure;
 use super::value::Reading;
 use super::{BondId, Constraint, ElementId, Kind, Meaning};
-use crate::algebra::{Expr, Exprs, Facts, MINUS_ONE, ONE, Symbol, ZERO};
+use crate::algebra::{Expr, Exprs, Facts, MINUS_ONE, Node, ONE, Symbol, ZERO};
 use crate::ast;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -153,6 +153,16 @@ impl<'a> Builder<'a, '_> {
     fn relation(&mut self, sides: &Sides, rates: &BTreeMap<Symbol, Expr>) -> Option<Relation> {
         let expr = self.exprs.substitute(sides.expr, rates);
         let holonomic = !self.exprs.depends_on_any(expr, &|s| matches!(self.meaning(s), Some(Meaning::Flow(_))));
+        if holonomic && self.jumps_in_time(expr) {
+            let d = Diagnostic::error(
+                codes::L015,
+                "a constraint on displacements that jumps",
+                sides.span,
+                "from one instant to the next it asks for other places",
+            );
+            self.fault(d.hint("no force moves a body at once: let it change over some time, `min(t/0.1 s, 1)`"));
+            return None;
+        }
         let speed = if holonomic { self.speed_of(expr, rates, sides.span)? } else { expr };
         let symbols = self.exprs.symbols_of(speed);
         let flows: Vec<Symbol> =
@@ -181,6 +191,28 @@ impl<'a> Builder<'a, '_> {
         // Numbers whose sum is 0 are not so in floats.
         let expr = if terms.is_empty() { ZERO } else { expr };
         Some(Relation { at: sides.at, expr, holonomic, terms, rest, restitution: sides.restitution, span: sides.span })
+    }
+
+    /// Whether an expression of displacements is known to jump while nothing moves: one number up to an instant, and another
+    /// one from there on, with nothing beside it that might jump back.
+    fn jumps_in_time(&mut self, expr: Expr) -> bool {
+        let parts = self.exprs.below(&[expr], &|_| true);
+        let choices = parts.into_iter().filter_map(|part| match *self.exprs.node(part) {
+            Node::Select(condition, a, b) => Some((condition, a, b)),
+            _ => None,
+        });
+        let [(condition, a, b)] = choices.collect::<Vec<_>>()[..] else { return false };
+        let difference = self.exprs.sub(a, b);
+        let numbers = !self.exprs.is_zero(difference) && self.reads_only(difference, false);
+        numbers && self.reads_only(condition, true)
+    }
+
+    /// Whether an expression reads parameters alone; with `time`, nothing but these and time, which it reads.
+    fn reads_only(&self, expr: Expr, time: bool) -> bool {
+        let symbols = self.exprs.symbols_of(expr);
+        let fixed = |s: &Symbol| matches!(self.meaning(*s), Some(Meaning::Parameter(_)));
+        let told = |s: &Symbol| fixed(s) || time && matches!(self.meaning(*s), Some(Meaning::Time));
+        symbols.iter().all(told) && (!time || !symbols.iter().all(fixed))
     }
 
     /// The rate of an expression of displacements.
