@@ -52,6 +52,8 @@ mod gradient;
 mod growth;
 #[path = "iltis.rs"]
 mod iltis;
+#[path = "jumps_random.rs"]
+mod jumps_random;
 #[path = "lanes_in_modes.rs"]
 mod lanes_in_modes;
 #[path = "library_std.rs"]

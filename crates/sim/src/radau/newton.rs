@@ -14,7 +14,7 @@ const STALLED: f64 = 0.3;
 const ROUNDING: f64 = f64::EPSILON;
 
 /// Roundings of all that an equation adds up that a correction may be made of.
-const NOISE: f64 = 8.0;
+const NOISE: f64 = 64.0;
 
 /// Rate of convergence beyond which there is none.
 const DIVERGENT: f64 = 0.99;
