@@ -6,6 +6,7 @@ use halfarrow_trace::{PlotOptions, Trace, plot, plot_runs, png};
 
 use crate::error::{Error, Problem};
 use crate::model::Model;
+use crate::pieces::smooth;
 
 /// Pixels of a PNG for each unit of length of the drawing.
 const SCALE: f32 = 2.0;
@@ -33,7 +34,7 @@ pub type NamedRuns<'r> = [(&'r str, &'r Trace)];
 impl Model {
     /// What was recorded, over time.
     pub fn plot(&self, trace: &Trace) -> Picture {
-        Picture { svg: plot(trace, self.title()) }
+        Picture { svg: plot(&smooth(trace), self.title()) }
     }
 
     /// Chosen variables of one or several runs, over time or over each other. The first run is the one of this model; the
@@ -46,7 +47,9 @@ impl Model {
             let known = runs.iter().flat_map(|(_, trace)| &trace.columns).map(|c| c.name.as_str());
             Problem::UnknownVariable { nearest: nearest(&name, known).map(str::to_string), name }
         };
-        plot_runs(runs, self.title(), options).map(|svg| Picture { svg }).map_err(unknown)
+        let fine: Vec<_> = runs.iter().map(|(name, trace)| (*name, smooth(trace))).collect();
+        let runs: Vec<(&str, &Trace)> = fine.iter().map(|(name, trace)| (*name, trace.as_ref())).collect();
+        plot_runs(&runs, self.title(), options).map(|svg| Picture { svg }).map_err(unknown)
     }
 
     /// What a picture of the model is called.

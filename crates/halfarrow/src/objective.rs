@@ -72,7 +72,7 @@ impl Number {
     /// The place of a turn is at rest, whatever moves the ends of its step along the curve.
     fn greatest(times: &[f64], values: &[f64], sign: f64) -> Number {
         let best = (0..values.len()).fold(0, |best, i| if sign * values[i] > sign * values[best] { i } else { best });
-        let steps = pieces(times).filter(|piece| piece.len() == STEP);
+        let steps = pieces(times, values).filter(|piece| piece.len() == STEP);
         let turns = steps.filter_map(|piece| {
             let samples: [f64; STEP] = std::array::from_fn(|k| values[piece.start + k]);
             let (u, value) = Quartic::through(samples).beyond(samples, sign)?;
@@ -95,7 +95,7 @@ impl Number {
         let mut number = Number { value: 0.0, by_sample: vec![0.0; times.len()], by_time: vec![0.0; times.len()] };
         let of = |v: f64| if squared { v * v } else { v };
         let slope_of = |v: f64| if squared { 2.0 * v } else { 1.0 };
-        for piece in pieces(times) {
+        for piece in pieces(times, values) {
             let (first, last) = (piece.start, piece.end - 1);
             let (h, [a, b]) = (times[last] - times[first], [values[first], values[last]]);
             if piece.len() == STEP {

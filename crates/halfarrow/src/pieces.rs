@@ -1,9 +1,11 @@
 //! What a variable does between its samples: a straight line, or within a step of a method that has a solution there a
 //! polynomial of degree four through the samples at both ends and at [`INSIDE`].
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use halfarrow_sim::{INSIDE, inside};
+use halfarrow_trace::{Column, Trace};
 
 /// Samples of a step with those inside.
 pub(crate) const STEP: usize = INSIDE.len() + 2;
@@ -11,6 +13,10 @@ pub(crate) const STEP: usize = INSIDE.len() + 2;
 pub(crate) const WEIGHTS: [f64; STEP] = [1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 1.0 / 20.0];
 /// The square of the inner places, from -1 to 1.
 const INNER: f64 = 3.0 / 7.0;
+/// How far off its neighbours the middle of a smooth step may be, as part of what it ranges over.
+const SMOOTH: f64 = 0.05;
+/// Parts into which a step is divided for pictures: even, so that its middle is a point.
+const POINTS: usize = 16;
 /// Where the slope is looked at for a change of its sign.
 const LOOKS: usize = 16;
 /// Halvings of the stretch in which it changes.
@@ -21,16 +27,25 @@ pub(crate) fn is_step(times: &[f64]) -> bool {
     times.len() == STEP && times[STEP - 1] > times[0] && times[1..STEP - 1] == inside(times[0], times[STEP - 1])
 }
 
-/// The pieces between samples: lines from one to the next, and steps with their inside.
-pub(crate) fn pieces(times: &[f64]) -> impl Iterator<Item = Range<usize>> + '_ {
+/// The pieces of a variable between its samples: lines from one to the next, and steps with their inside where it is smooth.
+pub(crate) fn pieces<'t>(times: &'t [f64], values: &'t [f64]) -> impl Iterator<Item = Range<usize>> + 't {
     let mut at = 0;
     std::iter::from_fn(move || {
-        let whole = times.get(at..at + STEP).is_some_and(is_step);
+        let whole = times.get(at..at + STEP).is_some_and(is_step) && is_smooth(&values[at..at + STEP]);
         let end = at + if whole { STEP } else { 2 };
         let piece = at..end;
         at = end - 1;
         (end <= times.len()).then_some(piece)
     })
+}
+
+/// Whether samples of a step are those of something smooth: the one in the middle is near to what a cubic through the others
+/// says. What jumps or has a corner inside of a step, as an output that no rate reads may, is not.
+pub(crate) fn is_smooth(v: &[f64]) -> bool {
+    let (ends, inner) = (0.5 * (v[0] + v[4]), 0.5 * (v[1] + v[3]));
+    let cubic = (inner - INNER * ends) / (1.0 - INNER);
+    let [least, greatest] = v.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, g], &v| [l.min(v), g.max(v)]);
+    (v[2] - cubic).abs() <= SMOOTH * (greatest - least)
 }
 
 /// The polynomial of a step, over a variable from -1 at its start to 1 at its end.
@@ -86,9 +101,63 @@ impl Quartic {
     }
 }
 
+/// The same curves with more points, where samples inside of steps tell how they go between: for pictures, and for what is
+/// greatest.
+pub fn smooth(trace: &Trace) -> Cow<'_, Trace> {
+    let all: Vec<Range<usize>> = pieces(&trace.times, &trace.times).collect();
+    if all.iter().all(|piece| piece.len() < STEP) {
+        return Cow::Borrowed(trace);
+    }
+    let part = |k: usize| k as f64 / POINTS as f64;
+    let refined = |values: &[f64], between: &dyn Fn(&[f64], f64) -> f64| {
+        let mut points: Vec<f64> = values.first().copied().into_iter().collect();
+        for piece in &all {
+            let own = &values[piece.clone()];
+            if own.len() == STEP {
+                points.extend((1..POINTS).map(|k| between(own, part(k))));
+            }
+            points.extend(own.last());
+        }
+        points
+    };
+    let on_line = |own: &[f64], part: f64| own[0] + part * (own[STEP - 1] - own[0]);
+    let on_curve = |own: &[f64], part: f64| match is_smooth(own) {
+        true => Quartic::through(std::array::from_fn(|k| own[k])).at(2.0 * part - 1.0),
+        false => {
+            let places = inside(0.0, 1.0);
+            let place = |k: usize| if k == 0 { 0.0 } else { places.get(k - 1).copied().unwrap_or(1.0) };
+            let k = (1..STEP - 1).take_while(|&k| place(k) <= part).count();
+            own[k] + (part - place(k)) / (place(k + 1) - place(k)) * (own[k + 1] - own[k])
+        }
+    };
+    let columns =
+        trace.columns.iter().map(|column| Column { values: refined(&column.values, &on_curve), ..column.clone() });
+    Cow::Owned(Trace { times: refined(&trace.times, &on_line), columns: columns.collect() })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn curves_get_smooth_within_steps() {
+        let f = |t: f64| t * (2.0 - t);
+        let [a, b, c] = inside(0.5, 2.5);
+        let times = vec![0.0, 0.5, a, b, c, 2.5, 2.5, 3.0];
+        let mut values: Vec<f64> = times.iter().map(|&t| f(t)).collect();
+        values[6] = -9.0;
+        let column = Column { name: "x".into(), unit: "m".into(), values };
+        let trace = Trace { times, columns: vec![column] };
+        let fine = smooth(&trace);
+        assert_eq!(fine.times.len(), 2 + POINTS + 2);
+        assert_eq!([fine.times[0], fine.times[1], fine.times[1 + POINTS]], [0.0, 0.5, 2.5]);
+        assert_eq!(fine.columns[0].values[2 + POINTS], -9.0);
+        for (t, x) in fine.times.iter().zip(&fine.columns[0].values).take(2 + POINTS) {
+            assert!((x - f(*t)).abs() < 1e-14, "{t}: {x}");
+        }
+        let lines = Trace { times: vec![0.0, 1.0, 2.0], columns: Vec::new() };
+        assert!(matches!(smooth(&lines), Cow::Borrowed(_)));
+    }
 
     /// A quartic at the samples of the step from 2 to 5.
     fn sampled(f: impl Fn(f64) -> f64) -> [f64; STEP] {
@@ -125,8 +194,15 @@ mod tests {
     fn steps_are_told_from_single_samples() {
         let [a, b, c] = inside(0.3, 0.5);
         let times = [0.0, 0.1, 0.3, a, b, c, 0.5, 0.5, 0.6];
-        let found: Vec<_> = pieces(&times).collect();
+        let found: Vec<_> = pieces(&times, &times).collect();
         assert_eq!(found, [0..2, 1..3, 2..7, 6..8, 7..9]);
-        assert!(pieces(&[0.0]).next().is_none() && pieces(&[]).next().is_none());
+        assert!(pieces(&[0.0], &[0.0]).next().is_none() && pieces(&[], &[]).next().is_none());
+        // What jumps within, at whatever place, and what has a corner.
+        for at in 1..STEP {
+            let jump: Vec<f64> = (0..times.len()).map(|k| if k < 2 + at { 0.0 } else { 1.0 }).collect();
+            assert!(pieces(&times, &jump).all(|piece| piece.len() == 2), "{at}");
+        }
+        assert!(!is_smooth(&times[2..7].iter().map(|t| (t - 0.4).abs()).collect::<Vec<_>>()));
+        assert!(is_smooth(&times[2..7].iter().map(|t| (t - 0.37) * (t - 0.37)).collect::<Vec<_>>()));
     }
 }

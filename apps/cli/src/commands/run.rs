@@ -4,8 +4,8 @@ use std::path::Path;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Gradient, Method, Model, Problem,
-    Record, Reduce, Run, RunReport, Scene, Simulated, Slope, Start, Stopped, Trace, csv_text, listed, write_csv,
-    write_parquet,
+    Record, Reduce, Run, RunReport, Scene, Simulated, Slope, Start, Stopped, Trace, csv_text, listed, smooth,
+    write_csv, write_parquet,
 };
 use serde_json::{Value, json};
 
@@ -294,6 +294,7 @@ fn more(rows: usize, where_else: &str) -> String {
 
 /// Start, end, least and greatest value of every column.
 fn values(trace: &Trace, page: Page) -> String {
+    let trace = smooth(trace);
     let columns = trace.columns.len();
     let rows = trace.columns.iter().take(shown(columns)).map(|c| {
         let first = c.values.first().copied().unwrap_or(f64::NAN);

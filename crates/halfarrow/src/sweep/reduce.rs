@@ -4,7 +4,7 @@ use halfarrow_compiler::unit::Unit;
 use halfarrow_sim::Sink;
 
 use crate::error::Problem;
-use crate::pieces::{Quartic, STEP, WEIGHTS, is_step};
+use crate::pieces::{Quartic, STEP, WEIGHTS, is_smooth, is_step};
 
 /// One number of one variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -216,6 +216,9 @@ impl Tally {
 
     /// A step with its inside, from the last sample on.
     fn add_step(&mut self, times: &[f64], values: [f64; STEP]) {
+        if !is_smooth(&values) {
+            return (1..STEP).for_each(|k| self.add(times[k - 1], times[k], values[k]));
+        }
         let h = times[STEP - 1] - times[0];
         for (weight, value) in WEIGHTS.iter().zip(values) {
             self.integral += h * weight * value;

@@ -476,11 +476,15 @@ impl Radau {
         self.error.iter_mut().for_each(|error| *error = -*error);
         self.matrices.solve_real(&mut self.error);
         let mut size = norm(&[&self.error], &self.allowed);
-        if size > TOLD {
-            // What rounding alone makes of an unknown that is nothing is no error of the step.
+        if size > TOLD && self.wanted.is_some() {
+            // What rounding alone makes of an unknown that does not act back on the motion is no error of the step.
             self.take_noise(system);
-            let told = |(error, noise): (&mut f64, &f64)| *error = if error.abs() <= *noise { 0.0 } else { *error };
-            self.error.iter_mut().zip(&self.noise).for_each(told);
+            let told = |(i, (error, noise)): (usize, (&mut f64, &f64))| {
+                if system.index(i) > 1 && error.abs() <= *noise {
+                    *error = 0.0;
+                }
+            };
+            self.error.iter_mut().zip(&self.noise).enumerate().for_each(told);
             size = norm(&[&self.error], &self.allowed);
         }
         if size.is_nan() { f64::INFINITY } else { size.max(1e-10) }
