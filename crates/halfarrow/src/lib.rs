@@ -107,7 +107,7 @@ pub use linearize::{
 pub use loops::{ComponentReport, ConservedReport, Count, Counts, LoopReport, LoopsReport, StateMatrix, StorageReport};
 pub use model::{Model, format_text, read_text};
 pub use names::{Name, Place, listed};
-pub use pieces::smooth;
+pub use pieces::extremes;
 pub use quantity::{duration, frequency};
 #[cfg(feature = "real_time")]
 pub use real_time::{Durations, Feed, ModesReport, RealTimeReport, RealTimeRun};

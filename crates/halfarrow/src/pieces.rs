@@ -101,9 +101,20 @@ impl Quartic {
     }
 }
 
-/// The same curves with more points, where samples inside of steps tell how they go between: for pictures, and for what is
-/// greatest.
-pub fn smooth(trace: &Trace) -> Cow<'_, Trace> {
+/// The least and the greatest value of a variable, also inside of steps of which samples tell. Of none: infinities.
+pub fn extremes(times: &[f64], values: &[f64]) -> [f64; 2] {
+    let mut found = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, g], &v| [l.min(v), g.max(v)]);
+    for piece in pieces(times, values).filter(|piece| piece.len() == STEP) {
+        let samples: [f64; STEP] = std::array::from_fn(|k| values[piece.start + k]);
+        let quartic = Quartic::through(samples);
+        let turn = |sign| quartic.beyond(samples, sign).map(|(_, value)| value);
+        found = [turn(-1.0).map_or(found[0], |v| v.min(found[0])), turn(1.0).map_or(found[1], |v| v.max(found[1]))];
+    }
+    found
+}
+
+/// The same curves with more points for pictures, where samples inside of steps tell how they go between.
+pub(crate) fn smooth(trace: &Trace) -> Cow<'_, Trace> {
     let all: Vec<Range<usize>> = pieces(&trace.times, &trace.times).collect();
     if all.iter().all(|piece| piece.len() < STEP) {
         return Cow::Borrowed(trace);
@@ -130,8 +141,11 @@ pub fn smooth(trace: &Trace) -> Cow<'_, Trace> {
             own[k] + (part - place(k)) / (place(k + 1) - place(k)) * (own[k + 1] - own[k])
         }
     };
-    let columns =
-        trace.columns.iter().map(|column| Column { values: refined(&column.values, &on_curve), ..column.clone() });
+    let columns = trace.columns.iter().map(|column| Column {
+        name: column.name.clone(),
+        unit: column.unit.clone(),
+        values: refined(&column.values, &on_curve),
+    });
     Cow::Owned(Trace { times: refined(&trace.times, &on_line), columns: columns.collect() })
 }
 

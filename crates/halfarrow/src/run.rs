@@ -33,6 +33,9 @@ use crate::model::Model;
 use crate::sensitivity::{By, column, quantities, vary, with_derivatives};
 use crate::verdict::{Made, OPEN};
 
+/// Steps with samples inside, at most: so many make curves smooth by themselves, and a long run does not take four times the
+/// memory.
+const SMOOTH: usize = 2000;
 /// Runs that record more variables than this record the ends of their steps only.
 const MOST_INSIDE: usize = 500;
 
@@ -47,8 +50,8 @@ pub struct Run {
     /// Times that are recorded in the place of these, in s, ascending; the end is always recorded. Empty: as `every` says.
     pub at: Vec<f64>,
     /// Whether methods of variable step record three points inside each step as well, where every step is recorded: what is
-    /// greatest and what means are is then known as exactly as the run, and curves are smooth. Of runs that record more than
-    /// 500 variables only gradients have them.
+    /// greatest and what means are is then known as exactly as the run, and curves are smooth. Gradients have them in all steps,
+    /// other runs in the first 2000, if they record at most 500 variables.
     pub inside: bool,
     /// The formulation.
     pub form: Form,
@@ -374,7 +377,7 @@ impl Model {
         progress: &mut dyn FnMut(Progress<'_>) -> bool,
     ) -> Result<(Vec<By>, Options, Simulated, Taped), Error> {
         let Begun { start, mut options, by, notes } = self.begin_explicit(system, run)?;
-        options.inside = run.inside;
+        options.inside = if run.inside { usize::MAX } else { 0 };
         let mut taped = None;
         let done = self.integrate(system, start, (&options, run.execution, &[]), (notes, Some(&mut taped)), progress);
         let done = judged(done, &Made::by(run))?;
@@ -398,7 +401,7 @@ impl Model {
         let (start, free) = self.start_with_freedom(system, run.start)?;
         notes.extend(one_of_many(free));
         let mut options = options(run)?;
-        options.inside &= system.observed() <= MOST_INSIDE;
+        options.inside = inside(run, system.observed());
         if options.check(start.len()).is_ok() {
             cost::check(system, &start, &options, system.observed())?;
         }
@@ -437,7 +440,7 @@ impl Model {
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         timings.start = begun.elapsed().as_secs_f64();
         let mut options = if explicit { options(run)? } else { implicit_options(run)? };
-        options.inside &= system.recorded().len() <= MOST_INSIDE;
+        options.inside = inside(run, system.recorded().len());
         if options.check(y.len()).is_ok() {
             let recorded = Recording::recorded(&system).len();
             cost::check(system.reference_mut(), &x, &options, recorded)?;
@@ -894,6 +897,11 @@ pub(crate) fn units(system: &impl Recording) -> Vec<Option<Unit>> {
     system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
 
+/// In how many steps a run that records so many variables has samples inside.
+fn inside(run: &Run, recorded: usize) -> usize {
+    if run.inside && recorded <= MOST_INSIDE { SMOOTH } else { 0 }
+}
+
 pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
     if matches!(run.method, Method::Fixed(_)) && run.step.is_none() {
         return Err(Problem::NoStep);
@@ -904,7 +912,7 @@ pub(crate) fn options(run: &Run) -> Result<Options, Problem> {
         to: run.to,
         every: run.every,
         at: run.at.clone(),
-        inside: run.inside,
+        inside: 0,
         step: run.step,
         rtol: run.rtol,
         atol: run.atol.map_or(AbsoluteTolerance::Scaled, AbsoluteTolerance::Same),

@@ -21,7 +21,7 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec::{self as exec, Execution};
 use halfarrow_sim::wide::{LANES, is_wide, simulate_wide};
-use halfarrow_sim::{Options, Stopped, Summary, simulate};
+use halfarrow_sim::{Method, Options, Stopped, Summary, simulate};
 use halfarrow_trace::{Column, CsvTable, ParquetTable, write_whole};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -215,7 +215,9 @@ impl Model {
         let plan = Plan::new(sweep, &system)?;
         let reducers = reducers(sweep, &mut system)?;
         let mut options = options(&sweep.run)?;
-        options.inside = sweep.reduce.iter().any(|reduce| reduce.reduction.is_over_time());
+        let over_time = sweep.reduce.iter().any(|reduce| reduce.reduction.is_over_time());
+        let by_steps = options.every.is_none() && options.at.is_empty() && !matches!(options.method, Method::Fixed(_));
+        options.inside = if over_time && by_steps { usize::MAX } else { 0 };
         options.check(system.program().states.len()).map_err(|e| Problem::BadOption { reason: e.to_string() })?;
         let notes = projected(system.program(), sweep.run.project, sweep.run.method)?;
         crate::cost::check_stops(&system, &options)?;
@@ -478,7 +480,7 @@ impl<'a> Copies<'a> {
     /// One set by itself, with any method.
     fn alone(&mut self, work: &SweepContext<'_>, set: usize, start: crate::run::Start) -> Outcome {
         let mut x = prepare(&mut self.system, self.model, work.plan, set, start)?;
-        let mut sink = Reducers::begin(work.reducers, work.options.inside);
+        let mut sink = Reducers::begin(work.reducers, work.options.inside > 0);
         simulate(&mut self.system, work.options, &mut x, &mut sink).map_err(|stopped| stopped.to_string())?;
         Ok(Ended::of(sink, &mut self.system, work.options.to, &x))
     }
@@ -501,7 +503,7 @@ impl<'a> Copies<'a> {
             prepared.push(found.map(|state| x.iter_mut().zip(state).for_each(|(x, state)| x[lane] = state)));
         }
         wide.begin();
-        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers, work.options.inside));
+        let mut sinks: [_; LANES] = std::array::from_fn(|_| Reducers::begin(work.reducers, work.options.inside > 0));
         let ends = simulate_wide(wide, work.options, &mut x, &mut sinks, wanted);
         let mut outcome = |lane: usize, prepared: Result<(), String>, end: Result<Summary, Stopped>, sink| {
             prepared?;

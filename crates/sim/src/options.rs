@@ -66,9 +66,9 @@ pub struct Options {
     pub every: Option<f64>,
     /// Times of the samples in the place of these, in s, ascending; the end is always sampled. Empty: as `every` says.
     pub at: Vec<f64>,
-    /// Whether samples at every step are taken at [`INSIDE`](crate::INSIDE) of it as well, by methods that have a solution there: those of
-    /// variable step.
-    pub inside: bool,
+    /// In how many steps at most, from the first one on, samples at every step are taken at [`INSIDE`](crate::INSIDE) of them
+    /// as well, by methods that have a solution there: those of variable step.
+    pub inside: usize,
     /// Step of a fixed-step method, in s; above 0. Only steps that end at a jump, a sample or the end are shorter.
     /// Other methods take it for the longest step, if given.
     pub step: Option<f64>,
@@ -90,7 +90,7 @@ impl Default for Options {
             to: 1.0,
             every: None,
             at: Vec::new(),
-            inside: false,
+            inside: 0,
             step: None,
             rtol: 1e-6,
             atol: AbsoluteTolerance::Scaled,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use halfarrow::{
     AuditReport, Deviation, DrawOptions, DriftReport, Error, Execution, FixedMethod, Gradient, Method, Model, Problem,
-    Record, Reduce, Run, RunReport, Scene, Simulated, Slope, Start, Stopped, Trace, csv_text, listed, smooth,
+    Record, Reduce, Run, RunReport, Scene, Simulated, Slope, Start, Stopped, Trace, csv_text, extremes, listed,
     write_csv, write_parquet,
 };
 use serde_json::{Value, json};
@@ -294,13 +294,11 @@ fn more(rows: usize, where_else: &str) -> String {
 
 /// Start, end, least and greatest value of every column.
 fn values(trace: &Trace, page: Page) -> String {
-    let trace = smooth(trace);
     let columns = trace.columns.len();
     let rows = trace.columns.iter().take(shown(columns)).map(|c| {
         let first = c.values.first().copied().unwrap_or(f64::NAN);
         let last = c.values.last().copied().unwrap_or(f64::NAN);
-        let least = c.values.iter().copied().fold(f64::INFINITY, f64::min);
-        let greatest = c.values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [least, greatest] = extremes(&trace.times, &c.values);
         let [first, last, least, greatest] = [first, last, least, greatest].map(screen::short);
         [c.name.clone(), c.unit.clone(), first, last, least, greatest]
     });

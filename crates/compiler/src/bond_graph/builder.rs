@@ -360,9 +360,13 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// Requires two quantities to have one dimension; reports a clash in general words. While values of names are read
     /// this is put off until the laws of the elements have spoken, so that a wrong output is not blamed on the elements.
     pub fn equal(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str) {
+        self.require(left, right, span, what, false);
+    }
+
+    fn require(&mut self, left: &Quantity, right: &Quantity, span: Span, what: &str, over_time: bool) {
         if let Some(later) = &mut self.later {
             let (left, right, what) = (left.clone(), right.clone(), what.to_string());
-            later.push(PutOff { left, right, span, what, here: self.now, over_time: false });
+            later.push(PutOff { left, right, span, what, here: self.now, over_time });
             return;
         }
         let reason = Reason { span, part: None };
@@ -375,10 +379,7 @@ impl<'a, 'f> Builder<'a, 'f> {
     /// whose rate reads it, numbers without a unit may stand for one over a time: whatever its unit is, its rate has it then.
     pub fn equal_over_time(&mut self, rate: &Quantity, own: &Quantity, span: Span, without_unit: bool) {
         let over_time = own.over(&Quantity::of(Dim::SECOND));
-        self.equal(rate, &over_time, span, "the rate and the signal over time");
-        if let Some(last) = self.later.as_mut().and_then(|later| later.last_mut()) {
-            last.over_time = without_unit;
-        }
+        self.require(rate, &over_time, span, "the rate and the signal over time", without_unit);
     }
 
     /// Takes back what was said about units in a model that writes none: `f = e + e^3` is a law of plain numbers there.

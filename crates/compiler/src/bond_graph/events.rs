@@ -116,7 +116,6 @@ impl<'a> Builder<'a, '_> {
         Some(Action { name, target: symbol, value: value.expr, impulse, span: action.span })
     }
 
-    /// The variable that tells the impulse of a law.
     /// The unit that a discrete variable or state is declared with.
     fn declared_unit(&self, symbol: Symbol) -> Option<Unit> {
         match self.meaning(symbol)? {
@@ -126,6 +125,7 @@ impl<'a> Builder<'a, '_> {
         }
     }
 
+    /// The variable that tells the impulse of a law.
     pub(super) fn impulse_of(&mut self, name: &str, target: Symbol, span: Span) -> Symbol {
         self.impulse(name, target, span, &mut BTreeMap::new())
     }

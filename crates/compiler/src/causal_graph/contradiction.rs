@@ -47,7 +47,9 @@ pub fn force_strokes(graph: &BondGraph, strokes: &mut Strokes, members: &[Elemen
     }
     core.extend(forced.iter().copied());
     if holds(&core, strokes) {
-        return Ok(forced.iter().all(|d| strokes.set(d.bond, d.at_to).is_ok()));
+        // What sources ask for is set with them.
+        forced.iter().try_for_each(|d| strokes.set(d.bond, d.at_to)).expect("they hold together");
+        return Ok(true);
     }
     // A minimal infeasible subset: drop each demand without which the rest is still contradictory.
     let mut i = 0;

@@ -683,7 +683,6 @@ impl StoragePort<'_> {
         Balance { state, own, rate: self.rate, z: self.z, dependent, is_momentum: false }
     }
 
-    /// The co-energy symbols of all ports of the storage.
     /// Whether its law may jump while what it stores moves steadily: at an instant, with another variable, with an input.
     pub(super) fn may_jump(&self, d: &Definitions) -> bool {
         let law = match self.law {
@@ -696,6 +695,7 @@ impl StoragePort<'_> {
             || d.x.depends_on_any(law, &|s| matches!(d.meaning(s), Some(Meaning::Input(_) | Meaning::Held(_))))
     }
 
+    /// The co-energy symbols of all ports of the storage.
     fn storage_speeds(&self, d: &Definitions) -> BTreeSet<Symbol> {
         let ports = 0..self.storage.laws.len() as u32;
         let port = |port| PortRef { element: self.state.port.element, port };

@@ -1,5 +1,5 @@
-//! What stays as it is where a source or the law of a storage jumps: each stored quantity together with those that follow it, `X + S^T X_d`.
-//! Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
+//! What stays as it is where a source or the law of a storage jumps: each stored quantity together with those that follow it,
+//! `X + S^T X_d`. Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
 use rustc_hash::FxHashSet;
 

@@ -442,7 +442,7 @@ impl Model {
         }
         self.events = work;
         // What storages keep is shared out by the ratios that hold from now on, not by those of conditions that have changed.
-        if set {
+        if set && (code.impulses.is_some() || code.kept.is_some()) {
             self.take_signs(t, x)?;
         }
         match code.impulses {

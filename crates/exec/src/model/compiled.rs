@@ -22,7 +22,10 @@ pub struct ModeId(pub u32);
 /// Makes programs of a model in which other variables stay independent.
 pub trait Alternatives: std::fmt::Debug + Send + Sync {
     /// The program in which set-valued laws have these branches and these variables stay independent, as far as they can,
-    /// decided at these values of the variables of the graph. `None` if there is none.
+    /// decided at these values of the variables of the graph.
+    ///
+    /// # Errors
+    /// There is none: why.
     fn program(
         &self,
         branches: &[u32],
@@ -196,7 +199,8 @@ impl Compiled {
     pub(super) fn why_without(&self, present: &[u32]) -> Option<(Vec<u32>, String)> {
         let others = self.others();
         let apart = |branches: &[u32]| branches.iter().zip(present).filter(|(a, b)| a != b).count();
-        let nearest = others.without.iter().min_by_key(|(branches, _)| apart(branches));
+        let without = others.without.iter().filter(|(branches, _)| branches[..] != *present);
+        let nearest = without.min_by_key(|(branches, _)| apart(branches));
         nearest.map(|(branches, why)| (branches.clone(), why.clone()))
     }
 

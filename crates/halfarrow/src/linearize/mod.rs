@@ -24,6 +24,8 @@ use crate::linear_algebra::{Complex, eigenvalues};
 use crate::model::Model;
 use crate::run::{Start, one_of_many};
 
+use state_space::StateSpace;
+
 pub use response::Response;
 pub use stability::Stability;
 pub use structure::ReachReport;
@@ -227,14 +229,15 @@ impl Model {
         };
         let (stability, uncertain) = stability::stability(&linear.a, &poles);
         notes.extend(uncertain);
-        let (zeros, uncertain) = zeros::zeros(&linear);
+        let scaled = StateSpace::scaled(&linear);
+        let (zeros, uncertain) = zeros::zeros(scaled.as_ref());
         notes.extend(uncertain);
         notes.extend(self.what_holds(&system, &linear, at));
         let symbolic =
             if wanted.symbolic { Some(symbolic::matrices(equations.clone(), inputs, &outputs)?) } else { None };
         let positions = positions(&mut system, &equations, t, &x).map_err(|failure| self.stopped(failure))?;
         let program = system.program();
-        let (controllability, observability) = present.reaches(&linear, inputs, &outputs)?;
+        let (controllability, observability) = present.reaches((scaled, linear.a.len()), inputs, &outputs)?;
         Ok(LinearizeReport {
             model: self.name().to_string(),
             at,

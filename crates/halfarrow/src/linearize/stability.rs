@@ -21,7 +21,7 @@ const ROUNDINGS: f64 = 64.0;
 /// Poles known to fewer digits are told.
 const DIGITS: f64 = 6.0;
 /// Larger matrices are not tried out: a pole counts as it comes.
-const AT_MOST: usize = 200;
+pub(super) const AT_MOST: usize = 200;
 
 /// Where the poles of a matrix are, and a note on those of which few digits are known.
 pub(super) fn stability(a: &[Vec<f64>], poles: &[Complex]) -> (Stability, Option<String>) {

@@ -18,13 +18,17 @@ const NOTHING: f64 = 4.0 * f64::EPSILON;
 /// Rows of a matrix.
 pub(super) type Rows = Vec<Vec<Known>>;
 
-/// A system in matrices: `x' = a x + b u`, `y = c x + d u`.
+/// A system in matrices: `x' = a x + b u`, `y = c x + d u`. States that are held stay in their places: outputs have nothing of
+/// them, and nobody looks at the others' parts of them any more.
+#[derive(Clone)]
 pub(super) struct StateSpace {
     pub(super) a: Rows,
     pub(super) b: Rows,
     pub(super) c: Rows,
     pub(super) d: Rows,
     pub(super) inputs: usize,
+    /// The states that are left.
+    pub(super) free: Vec<usize>,
 }
 
 /// The two largest entries of a row or column off the diagonal.
@@ -105,48 +109,54 @@ impl StateSpace {
             c: part(n..last_output, states),
             d: part(n..last_output, n..last_input),
             inputs,
+            free: (0..n).collect(),
         };
         let finite =
             [&system.a, &system.b, &system.c, &system.d].iter().all(|m| m.iter().flatten().all(Known::is_finite));
         finite.then_some(system)
     }
 
-    /// The system with inputs and outputs exchanged, which has the same zeros.
+    /// The system of the states that are left with inputs and outputs exchanged, which has the same zeros.
     pub(super) fn transposed(&self) -> StateSpace {
-        let of = |rows: &Rows, columns: usize| -> Rows {
-            (0..columns).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
+        let every: Vec<usize> = (0..self.d.len()).collect();
+        let of = |rows: &Rows, which: &[usize], columns: &[usize]| -> Rows {
+            columns.iter().map(|&j| which.iter().map(|&i| rows[i][j]).collect()).collect()
         };
-        let n = self.a.len();
+        let (free, inputs) = (&self.free, (0..self.inputs).collect::<Vec<usize>>());
         StateSpace {
-            a: of(&self.a, n),
-            b: of(&self.c, n),
-            c: of(&self.b, self.inputs),
-            d: of(&self.d, self.inputs),
-            inputs: self.c.len(),
+            a: of(&self.a, free, free),
+            b: of(&self.c, &every, free),
+            c: of(&self.b, free, &inputs),
+            d: of(&self.d, &every, &inputs),
+            inputs: self.d.len(),
+            free: (0..free.len()).collect(),
         }
     }
 
     /// How many states, in suitable coordinates, the outputs see: those that they hold, and what acts on the rates of these.
     pub(super) fn seen(mut self) -> usize {
-        let all = self.a.len();
+        let all = self.free.len();
         loop {
             let outputs = std::mem::take(&mut self.c);
             let seen = self.held_by(outputs);
             if seen.is_empty() {
-                return all - self.a.len();
+                return all - self.free.len();
             }
             self.hold(&seen);
         }
     }
 
-    /// Takes out states that are held, whose rates are outputs then.
+    /// Holds states, whose rates are outputs then.
     pub(super) fn hold(&mut self, states: &[usize]) {
-        let kept: Vec<usize> = (0..self.a.len()).filter(|j| !states.contains(j)).collect();
-        let of = |row: &[Known]| -> Vec<Known> { kept.iter().map(|&j| row[j]).collect() };
-        self.c = self.c.iter().chain(states.iter().map(|&j| &self.a[j])).map(|row| of(row)).collect();
-        self.d.extend(states.iter().map(|&j| self.b[j].clone()));
-        self.a = kept.iter().map(|&j| of(&self.a[j])).collect();
-        self.b = kept.iter().map(|&j| self.b[j].clone()).collect();
+        self.free.retain(|state| !states.contains(state));
+        for &state in states {
+            let row = &mut self.a[state];
+            let mut output = vec![Known::ZERO; row.len()];
+            self.free.iter().for_each(|&j| output[j] = row[j]);
+            self.c.push(output);
+            self.d.push(std::mem::take(&mut self.b[state]));
+        }
+        self.c.iter_mut().for_each(|output| states.iter().for_each(|&state| output[state] = Known::ZERO));
     }
 
     /// Coordinates in which each of these combinations of states is a state, up to a factor, or nothing: which states.
@@ -163,10 +173,12 @@ impl StateSpace {
                 .map(|(k, part)| (k, part.over(pivot)))
                 .collect();
             // The state is the combination less the others.
-            for row in self.a.iter_mut().chain(&mut self.c).chain(&mut combinations) {
+            let without = |row: &mut Vec<Known>| {
                 let factor = row[state];
                 parts.iter().for_each(|(k, part)| row[*k] = row[*k].less(factor, *part));
-            }
+            };
+            self.free.iter().for_each(|&i| without(&mut self.a[i]));
+            self.c.iter_mut().chain(&mut combinations).for_each(without);
             // And its rate that of the combination.
             for rows in [&mut self.a, &mut self.b] {
                 let mut sum = std::mem::take(&mut rows[state]);

@@ -3,7 +3,6 @@
 use halfarrow_compiler::algebra::{Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, ElementId, Kind, Meaning};
 use halfarrow_compiler::causal_graph::{CausalGraph, Reach, control_reach, observe_reach};
-use halfarrow_exec::Linearised;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -34,13 +33,11 @@ impl Model {
     /// What inputs reach and what outputs see.
     pub(super) fn reaches(
         &self,
-        linear: &Linearised,
+        (system, n): (Option<StateSpace>, usize),
         inputs: &[String],
         outputs: &[String],
     ) -> Result<(ReachReport, ReachReport), Error> {
         let causal = self.causal_graph()?;
-        let n = linear.a.len();
-        let system = StateSpace::scaled(linear);
         let control = system.as_ref().map(|system| system.transposed().seen());
         let observe = system.map(StateSpace::seen);
         let sources = sources_of(&causal.graph, inputs);

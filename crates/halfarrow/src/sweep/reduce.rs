@@ -16,8 +16,8 @@ pub struct Reduce {
 }
 
 /// Which number is kept of a variable. Over time they are over the run: within steps of a method that has a solution there,
-/// where those are [asked for](crate::Run::inside), and always in sweeps, over polynomials through samples inside; else over straight lines from
-/// one sample to the next.
+/// where those are [asked for](crate::Run::inside), and always in sweeps, over polynomials through samples inside; else over
+/// straight lines from one sample to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reduction {
     /// The first value.

@@ -54,7 +54,8 @@ impl Run<'_> {
     /// Samples inside the last step: those of the grid, clearly before its end, or those that every step has.
     pub(super) fn samples_inside<S: Stepper>(&mut self, stepper: &mut S, start: f64, end: f64) -> Result<(), Failure> {
         // Of a step that is next to nothing of the time the inside is rounding.
-        if matches!(self.samples, Samples::EveryStep) && self.options.inside && end - start > SHORT * end.abs() {
+        let wanted = matches!(self.samples, Samples::EveryStep) && self.counts.steps <= self.options.inside;
+        if wanted && end - start > SHORT * end.abs() {
             for t in inside(start, end.min(self.to)) {
                 self.sample_inside(stepper, t)?;
             }

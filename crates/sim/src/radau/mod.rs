@@ -480,7 +480,7 @@ impl Radau {
             // What rounding alone makes of an unknown that does not act back on the motion is no error of the step.
             self.take_noise(system);
             let told = |(i, (error, noise)): (usize, (&mut f64, &f64))| {
-                if system.index(i) > 1 && error.abs() <= *noise {
+                if self.index[i] > 1 && error.abs() <= *noise {
                     *error = 0.0;
                 }
             };

@@ -93,15 +93,15 @@ impl Radau {
     }
 
     /// Whether the correction of unknowns that do not act back on the motion is no more than what roundings of the equations make
-    /// of them, and that of the others what is allowed. The flow of a capacitor that a source
-    /// holds is the difference of two charges over the step: what rounding leaves of it may be large beside nothing at all.
+    /// of them, and that of the others what is allowed. The flow of a capacitor that a source holds is the difference of two
+    /// charges over the step: what rounding leaves of it may be large beside nothing at all.
     fn is_rounding(&mut self, system: &dyn ImplicitSystem) -> bool {
         if self.wanted.is_none() {
             return false;
         }
         self.take_noise(system);
         let fits = |(i, correction): (usize, &f64)| {
-            let noise = if system.index(i) > 1 { STUCK * self.noise[i] } else { 0.0 };
+            let noise = if self.index[i] > 1 { STUCK * self.noise[i] } else { 0.0 };
             correction.abs() <= noise.max(self.newton_tolerance * self.allowed[i])
         };
         self.correction.iter().all(|part| part.iter().enumerate().all(fits))

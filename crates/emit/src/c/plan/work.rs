@@ -104,11 +104,11 @@ impl Plan<'_> {
         if self.program.jumps.as_ref().is_some_and(|jumps| jumps.leaps) {
             jump = jump + w.round.clone() * 3 + w.switching.clone();
         }
-        // A round takes the sides of conditions anew.
+        // A round takes the sides of conditions anew, where storages share out what they keep before and behind that too.
         let round = if self.program.clauses.is_empty() {
             OperationCount::default()
         } else {
-            w.round.clone() + w.switching.clone()
+            w.round.clone() + w.switching.clone() * if self.program.jumps.is_some() { 3 } else { 1 }
         };
         Cost::new(step, jump, round, self)
     }

@@ -122,8 +122,10 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     int status = $MODEL_OK;
     int i;
     int a;
+//if impulses
 //if switches
     int set = 0;
+//end
 //end
 //if impulses
 //if held
@@ -146,8 +148,10 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
     for (i = 0; i < $CLAUSES; ++i) {
         for (a = $ha_action_starts[i]; m->clauses[i].fired && a < $ha_action_starts[i + 1]; ++a) {
             const int place = $ha_action_places[a];
+//if impulses
 //if switches
             set = set || $ha_action_kinds[a] == HA_DISCRETE || $ha_action_kinds[a] == HA_SIGNAL;
+//end
 //end
             if ($ha_action_kinds[a] == HA_DISCRETE) {
                 m->z[place] = m->new_values[a];
@@ -159,6 +163,7 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
             }
         }
     }
+//if impulses
 //if switches
     /* What storages keep is shared out by the ratios that hold from now on, not by those of conditions that have changed. */
     if (set) {
@@ -168,7 +173,6 @@ static int ha_change(ha_model *m, double t, $real *x, int first)
         }
     }
 //end
-//if impulses
     status = $ha_balance_impulses(m, t, x, first);
     if (status != $MODEL_OK) {
         return status;
