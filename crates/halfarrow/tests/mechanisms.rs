@@ -812,3 +812,23 @@ fn a_drawn_zero_compliance_holds_a_displacement() {
     let refused = wrong.expect_err("it is refused").render(false);
     assert!(refused.contains("does not satisfy the model"), "{refused}");
 }
+
+/// Sensors read efforts by blocks that borrow the factors of others, in routines that do not make them: with other independent
+/// variables they have to make them themselves.
+#[test]
+fn sensors_do_not_stop_an_exchange_of_variables() {
+    let text = include_str!("faults/sensors_in_a_loop.bond");
+    let run = |text: &str| {
+        let model = Model::from_text("loop.bond", text, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        let states = Record::Names(vec!["b1.inertia.x.f".into(), "j2.x.q".into()]);
+        let run = Run { to: 1.5, rtol: 1e-8, record: states, ..Run::default() };
+        let done = model.simulate(&run, &mut |_| true).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        assert!(done.report.exchanges > 0);
+        done.trace.columns.iter().map(|c| *c.values.last().expect("a value")).collect::<Vec<f64>>()
+    };
+    let without: String =
+        text.lines().filter(|line| !line.contains("FrameSensor")).map(|line| format!("{line}\n")).collect();
+    for (with, without) in run(text).into_iter().zip(run(&without)) {
+        assert!((with - without).abs() < 1e-5, "{with} and {without}");
+    }
+}

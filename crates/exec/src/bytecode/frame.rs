@@ -100,10 +100,9 @@ impl Frame {
                 }
                 Block::Linear { .. } => Newton::new(0, 0, false),
             };
-            // Factors that another block has made need no place here.
             let shared = matches!(block, Block::Linear { shared: Some(_), .. });
             Solver {
-                factors: if shared { Factors::none() } else { Factors::new(block) },
+                factors: Factors::new(block),
                 x: vec![0.0; n],
                 orientation: Orientation::new(if shared || constant { 0 } else { n }),
                 rate: vec![0.0; n],

@@ -11,7 +11,9 @@ pub(crate) use batch::{BatchFactors, UpperPattern};
 pub(crate) use full::Lu;
 pub(crate) use rank::RankRevealing;
 
-use halfarrow_compiler::program::Block;
+use std::sync::Arc;
+
+use halfarrow_compiler::program::{Block, Matrix};
 use sparse::SparseLu;
 
 /// The matrix of a solve block and its factors.
@@ -21,24 +23,28 @@ pub(crate) enum Factors {
     Full(Lu, Vec<u32>),
     /// In an order that is fixed.
     Sparse(SparseLu),
+    /// Those that another block has made serve, as long as a routine makes them; whether the matrix is symmetric.
+    Borrowed(Arc<Matrix>, bool),
 }
 
 impl Factors {
-    /// Room for the matrix of a block.
+    /// Room for the matrix of a block; where it borrows factors of another one, as soon as it has to make them itself.
     pub fn new(block: &Block) -> Factors {
-        let (n, matrix) = (block.size(), block.matrix());
-        match &matrix.factors {
-            Some(symbolic) => Factors::Sparse(SparseLu::new(symbolic.clone(), block.is_symmetric())),
-            None => {
-                let places = matrix.values.pattern().places().map(|(row, column)| (row * n + column) as u32);
-                Factors::Full(Lu::new(n, block.is_symmetric()), places.collect())
-            }
+        match block {
+            Block::Linear { shared: Some(_), matrix, .. } => Factors::Borrowed(matrix.clone(), block.is_symmetric()),
+            _ => Factors::of(block.matrix(), block.is_symmetric()),
         }
     }
 
-    /// No room: for blocks whose factors another one has.
-    pub fn none() -> Factors {
-        Factors::Full(Lu::new(0, false), Vec::new())
+    fn of(matrix: &Matrix, symmetric: bool) -> Factors {
+        let n = matrix.values.size();
+        match &matrix.factors {
+            Some(symbolic) => Factors::Sparse(SparseLu::new(symbolic.clone(), symmetric)),
+            None => {
+                let places = matrix.values.pattern().places().map(|(row, column)| (row * n + column) as u32);
+                Factors::Full(Lu::new(n, symmetric), places.collect())
+            }
+        }
     }
 
     /// Takes up the entries of the matrix, row by row, and factors it; `Err(unknown)` if no pivot is left for that, or if
@@ -51,6 +57,10 @@ impl Factors {
                 lu.factor()
             }
             Factors::Sparse(lu) => lu.factor(entries),
+            Factors::Borrowed(matrix, symmetric) => {
+                *self = Factors::of(matrix, *symmetric);
+                self.factor(entries)
+            }
         }
     }
 
@@ -59,6 +69,7 @@ impl Factors {
         match self {
             Factors::Full(lu, _) => lu.solve(b),
             Factors::Sparse(lu) => lu.solve(b),
+            Factors::Borrowed(..) => unreachable!("it was factored"),
         }
     }
 
@@ -67,6 +78,7 @@ impl Factors {
         match self {
             Factors::Full(lu, _) => lu.solve(b),
             Factors::Sparse(lu) => lu.solve_once(b),
+            Factors::Borrowed(..) => unreachable!("it was factored"),
         }
     }
 
@@ -75,6 +87,7 @@ impl Factors {
         match self {
             Factors::Full(lu, _) => lu.solve_transposed(b),
             Factors::Sparse(lu) => lu.solve_transposed(b),
+            Factors::Borrowed(..) => unreachable!("it was factored"),
         }
     }
 
@@ -83,6 +96,7 @@ impl Factors {
         match self {
             Factors::Full(lu, _) => lu.log_determinant(),
             Factors::Sparse(lu) => lu.log_determinant(),
+            Factors::Borrowed(..) => f64::NAN,
         }
     }
 
@@ -91,6 +105,7 @@ impl Factors {
         match self {
             Factors::Full(lu, _) => lu.is_positive(),
             Factors::Sparse(lu) => lu.is_positive(),
+            Factors::Borrowed(..) => false,
         }
     }
 }
