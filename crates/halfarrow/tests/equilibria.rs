@@ -195,3 +195,48 @@ fn infinity_is_no_rest() {
         }
     }
 }
+
+/// A crank hangs on a slide that a spring pushes outward. At the dead centre nothing moves the slide, whatever the crank does:
+/// that is no rest. Where it rests the potential energy has its least value, with or without the slide as what is independent.
+#[test]
+fn a_dead_centre_is_no_rest() {
+    let crank = |q0: f64, more: &str| {
+        format!(
+            "model Crank\nimport std.planar\nPlanarWorld:world -> 1[plane]:ground\n\
+             ground -> PlanarPrismatic:slide(n = [1, 0], q0 = {q0} m) -> 1[plane]:s\n\
+             s -> PlanarBody:piston(m = 1 kg, J = 0.01 kg.m2)\n\
+             ground -> PlanarRevolute:crank(q0 = 0.3 rad) -> 1[plane]:c\n\
+             c -> PlanarBody:web(m = 1 kg, J = 0.01 kg.m2, c = [0.1, 0])\n\
+             c -> PlanarTranslation:pin(d = [0.2, 0]) -> rod.a\ns -> rod.b\nPlanarRod:rod(l = 0.5)\n\
+             1:sr -> slide.axis\nsr -> C:spring(k = 100 N/m, q0 = -1 m)\nsr -> R:damper(5 N.s/m)\n{more}"
+        )
+    };
+    for more in ["", "prefer slide.rate.f\n", "prefer crank.rate.f\n"] {
+        let text = crank(0.69, more);
+        let rest = run_at_rest(&text).unwrap_or_else(|e| panic!("{more}: {}", e.render(false)));
+        let (angle, way) = (rest["crank.q"], rest["slide.q"]);
+        assert!((0.2 * angle.cos() + (0.25 - (0.2 * angle.sin()).powi(2)).sqrt() - way).abs() < 1e-12, "{way}");
+        // Virtual work: the spring against the weight of the web, 0.1 m away from the axis.
+        let moved = -0.2 * angle.sin() * (1.0 + 0.2 * angle.cos() / (0.25 - (0.2 * angle.sin()).powi(2)).sqrt());
+        let work = 100.0 * rest["spring.q"] * moved + 9.81 * 0.1 * angle.cos();
+        assert!(work.abs() < 1e-9 && (angle + 0.035374).abs() < 1e-5, "{more}: {angle}: {work:e}");
+    }
+}
+
+/// Nothing holds them: far away, where no digit is left of what is between them, is no place of rest.
+#[test]
+fn what_falls_does_not_rest_far_away() {
+    let machines = [
+        "g -> Prismatic:hub -> 1[frame]:h\nh -> Body:wheel(m = 40 kg, J = diag([1, 1, 1]))\n\
+         h -> Prismatic:strut(q0 = 0.5 m) -> 1[frame]:c\nc -> Body:car(m = 300 kg, J = diag([10, 10, 10]))\n",
+        "g -> Prismatic:hub(n = [0.3, 0.1, 1]) -> 1[frame]:h\nh -> Body:wheel(m = 4 kg, J = diag([1, 1, 1]))\n\
+         h -> Revolute:hinge(n = [1, 0, 0]) -> FixedTranslation:arm(d = [0, 0.5, 0.1]) -> 1[frame]:c\n\
+         c -> Body:car(m = 3 kg, J = diag([1, 1, 1]), c = [0, 0.2, 0])\n",
+    ];
+    for machine in machines {
+        let spring = "SpringDamper:s(k = 20 kN/m, l0 = 0.5, c = 1e3)\nh -> s.a\nc -> s.b\n";
+        let text = format!("model Falls\nimport std.multibody\nWorld:world -> 1[frame]:g\n{machine}{spring}");
+        let error = run_at_rest(&text).expect_err("it falls").render(false);
+        assert!(error.contains("no equilibrium was found"), "{error}");
+    }
+}

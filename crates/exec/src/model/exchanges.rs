@@ -147,7 +147,7 @@ impl Model {
     }
 
     /// Goes on in a mode with the same position and motion; `false`, with nothing changed, if it cannot tell them.
-    fn go_over(
+    pub(super) fn go_over(
         &mut self,
         mode: ModeId,
         t: f64,

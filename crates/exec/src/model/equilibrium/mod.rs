@@ -29,6 +29,8 @@ const TIMES_AWAY: std::ops::RangeInclusive<i32> = -6..=6;
 const STEPS_AWAY: usize = 3;
 /// A rate that changes its state by less than this part of it, in the shortest time that the model knows, says nothing of a step.
 const UNSEEN: f64 = 1e-12;
+/// What is rounding of a place.
+const LAST_DIGITS: f64 = 4.0 * f64::EPSILON;
 /// A constraint counts as kept if it is missed by less than this fraction of what its displacements come to.
 const KEPT: f64 = 1e-8;
 
@@ -113,7 +115,8 @@ impl Model {
         let mut x = x.to_vec();
         for _ in 0..ROUNDS {
             self.begin_delays_and_samples(t, &x).map_err(EquilibriumError::Failure)?;
-            let found = self.search_equilibrium(t, &x).and_then(|found| self.in_this_mode(t, found))?;
+            let found = self.search_equilibrium(t, &x).and_then(|found| self.at_rest_in_others(t, found))?;
+            let found = self.in_this_mode(t, found)?;
             if self.run.delays_and_samples.is_empty() || self.begins_at_rest(t, &found.x) {
                 return Ok(found);
             }
@@ -156,23 +159,71 @@ impl Model {
         if ended.is_empty() { Ok(found) } else { Err(EquilibriumError::Ended(ended)) }
     }
 
+    /// What was found, if it is at rest in the independent variables too that a run would take from there: at a dead centre
+    /// nothing moves the slide, whatever its crank does. Else the search goes on in those, and what it finds is told in the
+    /// present ones.
+    fn at_rest_in_others(&mut self, t: f64, found: Equilibrium) -> Result<Equilibrium, EquilibriumError> {
+        if !self.may_change_mode() {
+            return Ok(found);
+        }
+        let (mut other, mut y) = (self.clone(), found.x.clone());
+        other.run.pivots.clear();
+        if !other.exchange(t, &mut y, false).map_err(EquilibriumError::Failure)? {
+            return Ok(found);
+        }
+        let leaf = other.leaf(t, &y);
+        let mut jacobian = Jacobian::new(other.sparsity());
+        if other.rests_at(&mut jacobian, leaf.as_ref(), t, &y) {
+            return Ok(found);
+        }
+        let there = other.search_equilibrium(t, &y)?;
+        let values = other.values_of_all(t, &there.x).map_err(EquilibriumError::Failure)?;
+        let mut x = there.x.clone();
+        match other.go_over(self.run.mode, t, &mut x, &values).map_err(EquilibriumError::Failure)? {
+            true => *self = other,
+            false => return Err(EquilibriumError::None(Vec::new())),
+        }
+        Ok(Equilibrium { x, ..there })
+    }
+
+    /// The search in the present variables. What moves at its end as it did at the beginning, clearly, is not at rest.
     fn search_equilibrium(&mut self, t: f64, x: &[f64]) -> Result<Equilibrium, EquilibriumError> {
         let leaf = self.leaf(t, x);
         let leaf = leaf.as_ref();
         let mut jacobian = Jacobian::new(self.sparsity());
         let inert = self.inert(&mut jacobian, t, x).map_err(EquilibriumError::Failure)?;
         let within = (leaf, inert.as_slice());
-        let refused = match self.settle(&mut jacobian, within, t, x).and_then(|found| self.audited(leaf, t, found)) {
+        let mut beginning = Rest::new(x);
+        beginning.see(&self.point(&mut jacobian, within, t, x.to_vec()).map_err(EquilibriumError::Failure)?);
+        let found = self.search_on_all_ways(&mut jacobian, within, t, x)?;
+        self.rates_at(t, &found.x).map_err(EquilibriumError::Failure)?;
+        if beginning.are_unchanged(&self.dx) || self.is_of_rounding(&beginning, t, &found.x) {
+            self.rates_at(t, x).map_err(EquilibriumError::Failure)?;
+            let moving = beginning.moving(&self.dx).into_iter();
+            return Err(EquilibriumError::None(moving.map(|(i, rate)| (self.state_name(i), rate)).collect()));
+        }
+        Ok(found)
+    }
+
+    fn search_on_all_ways(
+        &mut self,
+        jacobian: &mut Jacobian,
+        within: (Option<&Leaf>, &[bool]),
+        t: f64,
+        x: &[f64],
+    ) -> Result<Equilibrium, EquilibriumError> {
+        let leaf = within.0;
+        let refused = match self.settle(jacobian, within, t, x).and_then(|found| self.audited(leaf, t, found)) {
             Err(EquilibriumError::Failure(failure)) => return Err(EquilibriumError::Failure(failure)),
             Err(refused) => refused,
             found => return found,
         };
-        if let Some(found) = self.settle_from_where_laws_bend(&mut jacobian, within, t, x) {
+        if let Some(found) = self.settle_from_where_laws_bend(jacobian, within, t, x) {
             return Ok(found);
         }
         let released = self.release_loads(within, t, x);
-        let found = released.and_then(|near| self.settled(&mut jacobian, within, t, &near));
-        found.or_else(|| self.settle_away(&mut jacobian, within, t, x)).ok_or(refused)
+        let found = released.and_then(|near| self.settled(jacobian, within, t, &near));
+        found.or_else(|| self.settle_away(jacobian, within, t, x)).ok_or(refused)
     }
 
     /// A search from the end of what is about linear on the way to the equilibrium of the linearised equations: behind it a diode
@@ -275,7 +326,8 @@ impl Model {
             let stands = newton.step.iter().zip(&at.x).all(|(step, x)| step.abs() <= 1e-13 * x.abs());
             // Along a leaf rates vanish with the relations that it keeps, and steps are those of positions that turn.
             let rests = rest.is_reached(&at);
-            let reached = rests && (leaf.is_some() || rest.is_near(&at, &newton.step));
+            let reached =
+                rests && (leaf.is_some() || rest.is_near(&at, &newton.step)) && !self.is_of_rounding(&rest, t, &at.x);
             if stands || rest.is_exact(&at) {
                 if reached {
                     return Ok(found());
@@ -333,6 +385,16 @@ impl Model {
         let moving = least.map(|least| least.moving).filter(|moving| !moving.is_empty());
         let moving = moving.unwrap_or_else(|| rest.moving(&at.rates));
         Err(EquilibriumError::None(moving.into_iter().map(|(i, rate)| (self.state_name(i), rate)).collect()))
+    }
+
+    /// Whether what rounding makes of a place moves as much as where the search began: then it is one of rest by chance, as where
+    /// bodies are so far away that no digit is left of what is between them.
+    fn is_of_rounding(&mut self, rest: &Rest, t: f64, x: &[f64]) -> bool {
+        [1.0, -1.0].into_iter().any(|way| {
+            let moved = |(i, x): (usize, &f64)| x * (1.0 + if i % 2 == 0 { way } else { -way } * LAST_DIGITS);
+            let near: Vec<f64> = x.iter().enumerate().map(moved).collect();
+            self.rates_at(t, &near).is_ok() && rest.are_unchanged(&self.dx)
+        })
     }
 
     /// Whether a move has left a constraint: near a position where a form is singular a long one may.

@@ -10,6 +10,13 @@ const NEAR: f64 = 1e-7;
 /// [Higham], chapter 7.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// A rate that was so many times above what counts as zero where the search began is none where it is not less than
+const CLEARLY: f64 = 1e3;
+/// and more than this part of the greatest rate there, as rates count,
+const BESIDE_OTHERS: f64 = 1e-6;
+/// this part of what it was: what adds up far away, where a spring leads from one great number to another, tells nothing.
+const UNCHANGED: f64 = 0.1;
+
 /// What the rates of a search are compared with.
 pub(super) struct Rest {
     /// The greatest terms of each rate on the way.
@@ -21,6 +28,8 @@ pub(super) struct Rest {
     /// Where the search began, and the rates there.
     start: Vec<f64>,
     first: Vec<f64>,
+    /// Which of them were clearly more than zero.
+    moved_first: Vec<bool>,
 }
 
 impl Rest {
@@ -32,6 +41,7 @@ impl Rest {
             fastest: 0.0,
             start: x.to_vec(),
             first: Vec::new(),
+            moved_first: Vec::new(),
         }
     }
 
@@ -45,11 +55,15 @@ impl Rest {
         for ((most, own), rate) in self.terms.iter_mut().zip(terms).zip(&at.rates) {
             *most = most.max(rate.abs()).max(own);
         }
-        if self.first.is_empty() {
-            self.first.clone_from(&at.rates);
-        }
         self.fastest = at.fastest_pair();
         self.joined = joined(at, &weights);
+        if self.first.is_empty() {
+            self.first.clone_from(&at.rates);
+            let size = |i: usize| (weights.0[i] * at.rates[i]).abs();
+            let most = (0..at.x.len()).map(size).filter(|size| size.is_finite()).fold(0.0f64, f64::max);
+            let clearly = |i: usize| size(i) > BESIDE_OTHERS * most && self.moves(i, at.rates[i] / CLEARLY);
+            self.moved_first = (0..at.x.len()).map(clearly).collect();
+        }
     }
 
     /// Whether all rates vanish as far as their own terms tell.
@@ -59,7 +73,17 @@ impl Rest {
 
     /// Whether all rates are as good as zero.
     pub fn is_reached(&self, at: &LinearisedPoint) -> bool {
-        (0..at.x.len()).all(|i| !self.moves(i, at.rates[i]) || self.is_idle(at, i, 1e-13))
+        let moves = |i: usize| self.is_unchanged(&at.rates, i) || self.moves(i, at.rates[i]);
+        (0..at.x.len()).all(|i| !moves(i) || self.is_idle(at, i, 1e-13))
+    }
+
+    /// Whether any of these rates is about what it was where the search began, and was more than zero there.
+    pub fn are_unchanged(&self, rates: &[f64]) -> bool {
+        (0..rates.len()).any(|i| self.is_unchanged(rates, i))
+    }
+
+    fn is_unchanged(&self, rates: &[f64], i: usize) -> bool {
+        self.moved_first[i] && rates[i].abs() > UNCHANGED * self.first[i].abs()
     }
 
     /// Whether a step leads hardly further, beside where the search stands and where it began. Rates tell that by themselves
