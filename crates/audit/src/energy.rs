@@ -40,6 +40,9 @@ fn outside(graph: &BondGraph, id: ElementId, element: &Element, storage: &Storag
     read.filter(|s| !own(s) && !parameter(s)).collect()
 }
 
+/// What never exceeds this has not moved: methods take a state that nothing moves to be as great.
+const NOTHING: f64 = 1e-100;
+
 /// Stored quantities and integrated signals against the integrals of their rates.
 pub(crate) fn rates(
     graph: &BondGraph,
@@ -76,6 +79,9 @@ pub(crate) fn rates(
             unchecked.push(format!("the rate of {}: its value is not known", signal.name));
             continue;
         };
+        if scales.is_neglected(graph, signal.symbol) || greatest(x) < NOTHING {
+            continue;
+        }
         let reader = match values.reader(&[signal.rate]) {
             Ok(reader) => reader,
             Err(missing) => {

@@ -152,10 +152,11 @@ pub(crate) fn links(
                         |at: &[(Symbol, f64)]| moved_by(graph, (scales, settled), &reader, (middle, at), |v| v[0]);
                     let near = slopes(&[]);
                     let tells = tells(settled, near.iter().copied());
-                    let pairs = near.iter().copied().zip(slopes(&far(graph, (scales, settled), &reader)));
-                    links.extend(pairs.map(|((from, weight), (_, far))| {
-                        let straight = is_same(weight, far) && tells(from, weight);
-                        Link { of, from, weight, straight }
+                    // Where it has no value there, it is no straight line.
+                    let far = [1.0, -1.0].map(|way| slopes(&far(graph, (scales, settled), &reader, way)));
+                    links.extend(near.iter().enumerate().map(|(i, &(from, weight))| {
+                        let same = far.iter().all(|far| far.get(i).is_some_and(|far| is_same(weight, far.1)));
+                        Link { of, from, weight, straight: same && tells(from, weight) }
                     }));
                 }
                 Law::Product { factor, divisor, right: (right, from), of, .. } => {
@@ -199,10 +200,10 @@ fn tells(settled: &Settled, terms: impl Iterator<Item = (Quantity, f64)>) -> imp
     move |from, weight| size(from, weight) >= LOST * greatest
 }
 
-/// Everything that a law reads moved by its size: what it makes of a variable there is as here if it is a straight line in
-/// it, and no other variable tells how steep.
-fn far(graph: &BondGraph, (scales, settled): (&Scales, &Settled), reader: &Reader) -> Vec<(Symbol, f64)> {
-    reader.moves().iter().map(|&symbol| (symbol, settled.of(scales.of(graph, symbol)))).collect()
+/// Everything that a law reads at its size, to one side or the other: what it makes of a variable there is as here if it is a
+/// straight line in it, and no other variable tells how steep, as the load of a tyre does that has left the ground.
+fn far(graph: &BondGraph, (scales, settled): (&Scales, &Settled), reader: &Reader, way: f64) -> Vec<(Symbol, f64)> {
+    reader.moves().iter().map(|&symbol| (symbol, way * settled.of(scales.of(graph, symbol)))).collect()
 }
 
 fn is_same(near: f64, far: f64) -> bool {
