@@ -86,3 +86,21 @@ fn the_bicycle_rolls_as_lagrange_has_it() {
     }
     agrees(&bicycle, "fall.csv", exact, 1e-9);
 }
+
+/// Its joints turn by angles of 0 at the start, by whose sines no form divides.
+#[test]
+fn every_form_rides_the_bicycle() {
+    let end = |form: Form| {
+        let run =
+            Run { to: 0.05, form, record: Record::Names(vec!["lean.q".into(), "steer.q".into()]), ..Run::default() };
+        let done = bicycle(&[]).simulate(&run, &mut |_| true);
+        let done = done.unwrap_or_else(|e| panic!("{}: {}", form.name(), e.render(false)));
+        done.trace.columns.iter().map(|c| *c.values.last().expect("a value")).collect::<Vec<f64>>()
+    };
+    let minimal = end(Form::Minimal);
+    for form in [Form::Kane, Form::Lagrange, Form::Break, Form::Relaxed, Form::Inverted] {
+        for (found, expected) in end(form).into_iter().zip(&minimal) {
+            assert!((found - expected).abs() < 1e-5, "{}: {found} instead of {expected}", form.name());
+        }
+    }
+}

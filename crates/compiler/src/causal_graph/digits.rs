@@ -78,17 +78,39 @@ pub(super) fn cost(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut Nu
 }
 
 /// Whether a divisor is zero within rounding error at a point.
-fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
-    let value = point.value(x, divisor);
+pub(super) fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
     match x.node(divisor) {
         Node::Mul(factors) => factors.iter().any(|&f| vanishes(x, f, point)),
-        Node::Add(terms) => {
-            let size: f64 = terms.iter().map(|&t| point.value(x, t).abs()).sum();
-            value.abs() <= VANISHING * size
+        Node::Pow(base, _) => vanishes(x, *base, point),
+        Node::Add(_) | Node::Call(..) => {
+            let size = natural_size(x, divisor, point, &mut BTreeMap::new());
+            point.value(x, divisor).abs() <= VANISHING * size
         }
-        Node::Call(..) => value.abs() <= VANISHING,
-        _ => value == 0.0,
+        _ => point.value(x, divisor) == 0.0,
     }
+}
+
+/// The size that an expression would have if its terms did not cancel and its functions, of angles for the most part, were 1.
+fn natural_size(x: &Exprs, e: Expr, point: &mut NumericPoint, known: &mut BTreeMap<Expr, f64>) -> f64 {
+    if let Some(&size) = known.get(&e) {
+        return size;
+    }
+    let size = match x.node(e) {
+        Node::Add(terms) => terms.iter().map(|&t| natural_size(x, t, point, known)).sum(),
+        Node::Mul(factors) => factors.iter().map(|&f| natural_size(x, f, point, known)).product(),
+        Node::Pow(base, exponent) => {
+            let exponent = x.is_number(*exponent).and_then(|n| n.small());
+            let whole = exponent.filter(|(n, of)| *of == 1 && n.unsigned_abs() <= 8);
+            let Some((n, _)) = whole else { return point.value(x, e).abs() };
+            let base = natural_size(x, *base, point, known);
+            let power: f64 = (0..n.unsigned_abs()).map(|_| base).product();
+            if n < 0 { 1.0 / power } else { power }
+        }
+        Node::Call(..) => 1.0_f64.max(point.value(x, e).abs()),
+        _ => point.value(x, e).abs(),
+    };
+    known.insert(e, size);
+    size
 }
 
 /// Definitions at a point as numeric combinations of inputs alone.

@@ -4,18 +4,21 @@
 use std::collections::BTreeSet;
 
 use super::assign::{preferred, sequential};
-use super::ports::{CausalityPreferences, Virtual, imposes_effort, solve_part_at_length};
+use super::by_size::solve_part_by_size;
+use super::digits;
+use super::ports::{CausalityPreferences, Solved, Virtual, imposes_effort, solve_part_at_length};
 use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
 use super::signals::signal_graph;
+use super::start_point::start_point;
 use super::strokes::{Strokes, parts};
 use super::{CausalGraph, PortState, Ports, Role, Stroke, break_set, local, two_ports};
-use crate::algebra::{Assumptions, Symbol};
+use crate::algebra::{Assumptions, Exprs, NumericPoint, Symbol};
 use crate::bond_graph::{BondGraph, BondId, Element, ElementId, Kind, PortCausality, PortRef};
 use crate::ids::Table;
 
 /// The graph with these strokes, its ports as drawn: roles by stroke, every bond variable defined by the element that
-/// sets it. Such definitions can be cyclic (causal loops). Parts without a complete causality keep the ports that elimination
-/// found, with their inputs and outputs.
+/// sets it. Such definitions can be cyclic (causal loops). Parts without a complete causality, and those in which a two-port
+/// has a stroke by which it divides by zero at the start, keep the ports that elimination found, with their inputs and outputs.
 pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> CausalGraph {
     let graph = &causal.graph;
     let mut x = graph.exprs.clone();
@@ -24,17 +27,25 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     let drawn = |port: PortRef| sits_at(graph, strokes, port);
     let mut kept = BTreeSet::new();
     let speeds = kept_in(causal, strokes);
+    let mut start = start_point(&x, graph);
     for members in parts(graph) {
-        if members.iter().all(|&m| is_drawn(graph, &speeds, &drawn, m)) && !turns_sources(causal, &members, &drawn) {
-            ports.ports.extend(local::roles(graph, &members, &drawn));
-            let own = |v: &&Virtual| speeds.contains(&v.junction) && members.binary_search(&v.junction).is_ok();
-            let own: Vec<Virtual> = causal.ports.virtual_speeds.iter().filter(own).copied().collect();
-            let (definitions, divisors) = local::definitions(&mut x, graph, &members, &drawn, &own);
-            ports.virtual_speeds.extend(own);
-            ports.definitions.extend(definitions);
-            ports.watched.extend(divisors);
-        } else {
-            kept.extend(members);
+        let assumed = x.assumed();
+        let drawn_here =
+            members.iter().all(|&m| is_drawn(graph, &speeds, &drawn, m)) && !turns_sources(causal, &members, &drawn);
+        let own = |v: &&Virtual| speeds.contains(&v.junction) && members.binary_search(&v.junction).is_ok();
+        let own: Vec<Virtual> = causal.ports.virtual_speeds.iter().filter(own).copied().collect();
+        let local = drawn_here.then(|| local::definitions(&mut x, graph, &members, &drawn, &own));
+        match local.filter(|(_, divisors)| !divisors.iter().any(|&d| digits::vanishes(&x, d, &mut start))) {
+            Some((definitions, divisors)) => {
+                ports.ports.extend(local::roles(graph, &members, &drawn));
+                ports.virtual_speeds.extend(own);
+                ports.definitions.extend(definitions);
+                ports.watched.extend(divisors);
+            }
+            None => {
+                x.suppose(assumed);
+                kept.extend(members);
+            }
         }
     }
     if !kept.is_empty() {
@@ -102,8 +113,9 @@ pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     let mut x = graph.exprs.clone();
     x.forget_unwatched(&Assumptions::default());
     let mut ports = Ports::default();
+    let mut start = start_point(&x, graph);
     for members in parts(graph) {
-        let solved = solve_part_at_length(&mut x, graph, &members, &preferences(causal, &members));
+        let solved = solve_open(&mut x, graph, &members, &preferences(causal, &members), &mut start);
         ports.ports.extend(solved.ports);
         ports.definitions.extend(solved.definitions);
         ports.watched.extend(solved.watched);
@@ -112,6 +124,31 @@ pub fn without_constraints(causal: &CausalGraph) -> CausalGraph {
     }
     ports.ports.sort_by_key(|p| p.port);
     CausalGraph { graph: graph.with_exprs(x), strokes: causal.strokes.clone(), ports }
+}
+
+/// Solves a part with its constraints taken out; by the size of pivots where it would divide by zero at the start.
+fn solve_open(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    preferences: &CausalityPreferences,
+    start: &mut NumericPoint,
+) -> Solved {
+    let before = x.assumed();
+    let solved = solve_part_at_length(x, graph, members, preferences);
+    let cost = digits::cost(x, graph, &solved, start);
+    if cost < digits::COSTLY {
+        return solved;
+    }
+    let with_solved = x.assumed();
+    x.suppose(before);
+    let by_size = solve_part_by_size(x, graph, members, preferences, start);
+    let by_size =
+        by_size.filter(|found| found.tells_as_much_as(&solved) && digits::cost(x, graph, found, start) < cost);
+    by_size.unwrap_or_else(|| {
+        x.suppose(with_solved);
+        solved
+    })
 }
 
 fn preferences(causal: &CausalGraph, members: &[ElementId]) -> CausalityPreferences {
