@@ -97,6 +97,13 @@ impl Model {
         Source::text(source.name(), source.content()).with_files(files.texts())
     }
 
+    /// Whether it was read from the same texts.
+    pub(crate) fn has_text_of(&self, other: &Model) -> bool {
+        let (own, others) = (&self.origin, &other.origin);
+        let same = || own.source.content() == others.source.content() && own.files.texts() == others.files.texts();
+        Arc::ptr_eq(own, others) || same()
+    }
+
     /// The bytes of a file, whose path is seen from where its text is.
     pub(crate) fn source_bytes(&self, path: &str) -> Result<Vec<u8>, FileError> {
         self.origin.source.files().read_bytes(path)

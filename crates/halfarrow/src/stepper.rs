@@ -1,5 +1,7 @@
 //! A run in the hands of the caller: stepped, read, set, saved and taken up again.
 
+use std::sync::Arc;
+
 use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::program::Program;
 use halfarrow_compiler::unit::Unit;
@@ -34,13 +36,10 @@ use crate::sweep::known_parameter;
 /// # Ok::<(), halfarrow::Error>(())
 /// ```
 pub struct Stepper {
-    model: Model,
     system: exec::Model,
     run: Stepwise,
-    method: FixedMethod,
-    project: bool,
-    step: f64,
-    /// Steps of this length since `from`.
+    of: RunKind,
+    /// Steps since `from`.
     steps: u64,
     /// Where they are counted from.
     from: f64,
@@ -51,9 +50,35 @@ pub struct Stepper {
     values: Vec<f64>,
 }
 
+/// What runs have in common of which one can go on where another stands.
+#[derive(Debug, Clone)]
+struct RunKind {
+    model: Model,
+    /// The states of the equations as they are compiled.
+    states: Arc<[String]>,
+    method: FixedMethod,
+    project: bool,
+    step: f64,
+}
+
+impl RunKind {
+    /// Why a run of this kind cannot go on where one of the other kind stands, if it cannot.
+    fn differs_from(&self, other: &RunKind) -> Option<String> {
+        if !self.model.has_text_of(&other.model) || self.states != other.states {
+            return Some(format!("it is of another model, `{}`", other.model.name()));
+        }
+        if self.method != other.method || self.project != other.project {
+            return Some("it is of a run by another method".into());
+        }
+        (self.step != other.step)
+            .then(|| format!("it is of a run with steps of {} s, those of this one take {} s", other.step, self.step))
+    }
+}
+
 /// Where a run stands, with its parameters and inputs.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
+    of: RunKind,
     setup: exec::Setup,
     memory: exec::Memory,
     position: Position,
@@ -101,8 +126,9 @@ impl Compiled {
         let mut run = Stepwise::new(method, 0.0, &system).projecting(project);
         run.start(&mut system, &mut x).map_err(|stopped| self.model().stopped_at(stopped))?;
         let inputs = vec![None; system.program().inputs.len()];
-        let model = self.model().clone();
-        Ok(Stepper { model, system, run, method, project, step, steps: 0, from: 0.0, x, inputs, values: Vec::new() })
+        let states = self.minimal().program().states.iter().map(|state| state.name.clone()).collect();
+        let of = RunKind { model: self.model().clone(), states, method, project, step };
+        Ok(Stepper { of, system, run, steps: 0, from: 0.0, x, inputs, values: Vec::new() })
     }
 }
 
@@ -114,7 +140,7 @@ impl Stepper {
 
     /// The length of a step, in s.
     pub fn step(&self) -> f64 {
-        self.step
+        self.of.step
     }
 
     /// Goes on by so many steps.
@@ -124,9 +150,9 @@ impl Stepper {
     pub fn advance(&mut self, steps: u64) -> Result<(), Error> {
         for _ in 0..steps {
             // Steps are counted, not added up: a day of 1 ms is a day.
-            let to = tick(self.from, self.step, (self.steps + 1) as f64);
+            let to = tick(self.from, self.of.step, (self.steps + 1) as f64);
             let done = self.run.advance(&mut self.system, to, &mut self.x);
-            done.map_err(|stopped| self.model.stopped_at(stopped))?;
+            done.map_err(|stopped| self.of.model.stopped_at(stopped))?;
             self.steps += 1;
         }
         Ok(())
@@ -186,7 +212,7 @@ impl Stepper {
         };
         self.values.resize(self.system.recorded().len(), 0.0);
         let seen = self.system.observe(self.run.time(), &self.x, &mut self.values);
-        seen.map_err(|failure| self.model.stopped(failure))?;
+        seen.map_err(|failure| self.of.model.stopped(failure))?;
         let unit = self.system.program().observed[self.system.recorded()[place]].unit.as_ref();
         Ok(unit.filter(|unit| !unit.is_si()).map_or(self.values[place], |unit| unit.from_si_f64(self.values[place])))
     }
@@ -206,6 +232,7 @@ impl Stepper {
     /// All that the run needs to go on from here.
     pub fn save(&self) -> Snapshot {
         Snapshot {
+            of: self.of.clone(),
             setup: self.system.setup().clone(),
             memory: self.system.memory(),
             position: self.run.position().clone(),
@@ -221,9 +248,13 @@ impl Stepper {
     /// the same method and step.
     ///
     /// # Errors
-    /// Nothing can be solved with its parameters, which were another model's.
+    /// It is of another model, method or step.
     pub fn restore(&mut self, saved: &Snapshot) -> Result<(), Error> {
-        self.system.set_up(&saved.setup).map_err(|failure| self.model.stopped(failure))?;
+        if let Some(reason) = self.of.differs_from(&saved.of) {
+            let reason = format!("the snapshot does not fit this run: {reason}");
+            return Err(Problem::BadOption { reason }.into());
+        }
+        self.system.set_up(&saved.setup).map_err(|failure| self.of.model.stopped(failure))?;
         self.inputs.clone_from(&saved.inputs);
         self.place_inputs();
         self.system.restore(&saved.memory);
@@ -237,8 +268,8 @@ impl Stepper {
     fn take_up(&mut self) -> Result<(), Error> {
         self.place_inputs();
         (self.from, self.steps) = (self.time(), 0);
-        self.run = Stepwise::new(self.method, self.from, &self.system).projecting(self.project);
-        self.run.start(&mut self.system, &mut self.x).map_err(|stopped| self.model.stopped_at(stopped))
+        self.run = Stepwise::new(self.of.method, self.from, &self.system).projecting(self.of.project);
+        self.run.start(&mut self.system, &mut self.x).map_err(|stopped| self.of.model.stopped_at(stopped))
     }
 
     fn place_inputs(&mut self) {

@@ -203,6 +203,26 @@ fn what_is_saved_goes_on_with_the_same_bits() {
 }
 
 #[test]
+fn a_snapshot_is_of_one_model_method_and_step() {
+    let text = |k: f64| format!("model A\nparam k = {k}\nSe:p(1) -> 1:v -> I:m(2)\nv -> C:c(k = k)\n");
+    let model = |text: &str| {
+        let model = Model::from_text("a.bond", text, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        model.compile(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)))
+    };
+    let begun = |compiled: &Compiled, method, step| compiled.stepper(method, step, Start::Given).expect("a start");
+    let one = model(&text(50.0));
+    let saved = begun(&one, FixedMethod::Rk4, 1e-3).save();
+    let refused = |mut run: Stepper| run.restore(&saved).expect_err("it fits nothing").to_string();
+    let other = model("model B\nparam k = 50\nSe:p(1) -> 1:v -> I:l(2)\nv -> R:r(3)\nv -> C:z(1)\n");
+    assert!(refused(begun(&other, FixedMethod::Rk4, 1e-3)).contains("another model, `A`"));
+    assert!(refused(begun(&model(&text(51.0)), FixedMethod::Rk4, 1e-3)).contains("another model"));
+    assert!(refused(begun(&one, FixedMethod::Heun, 1e-3)).contains("another method"));
+    assert!(refused(begun(&one, FixedMethod::Rk4, 2e-3)).contains("steps of 0.001 s"));
+    // The same text compiled once more is the same model.
+    begun(&model(&text(50.0)), FixedMethod::Rk4, 1e-3).restore(&saved).expect("it fits");
+}
+
+#[test]
 fn a_stepper_refuses_what_there_is_not() {
     let crane = crane();
     let mut run = crane.stepper(FixedMethod::Rk4, 1e-2, Start::Given).expect("a start");

@@ -110,7 +110,11 @@ class Stepper:
         return self._run().save()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Goes on from there, with the same bits. The snapshot is of a stepper of the same model, method and step."""
+        """Goes on from there, with the same bits. The snapshot is of a stepper of the same model, method and step.
+
+        Raises:
+            UsageError: it is of another model, method or step.
+        """
         self._run().restore(snapshot)
 
     def close(self) -> None:
