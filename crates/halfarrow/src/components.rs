@@ -43,6 +43,8 @@ pub struct Component {
     pub ports: Vec<Entry>,
     /// Its parameters.
     pub parameters: Vec<Entry>,
+    /// What it is made for, of numbers and parameters.
+    pub constants: Vec<Entry>,
     /// The signals that it reads.
     pub inputs: Vec<Entry>,
     /// The signals that it gives.
@@ -155,6 +157,7 @@ impl Component {
             law,
             ports: entries(&c.ports),
             parameters: entries(&c.params),
+            constants: entries(&c.consts),
             inputs: entries(&c.ins),
             outputs,
             text: text[start..end].to_string(),
@@ -163,7 +166,8 @@ impl Component {
 
     /// How it is written with what it needs: `Resistor:name(r = …)`.
     pub fn usage(&self) -> String {
-        let needed = self.parameters.iter().chain(&self.inputs).filter(|e| e.default.is_none());
+        let all = self.parameters.iter().chain(&self.constants).chain(&self.inputs);
+        let needed = all.filter(|e| e.default.is_none());
         let needed: Vec<String> = needed.map(|e| format!("{} = …", e.name)).collect();
         match needed.is_empty() {
             true => format!("{}:name", self.name),

@@ -656,7 +656,7 @@ fn every_component_is_documented_and_tested_here() {
             assert!(seen.insert(c.name.clone()), "{} is there twice", c.name);
             assert!(tests.contains(&format!("{}:", c.name)), "{} has no test", c.name);
             assert!(!c.doc.is_empty() && c.law.starts_with("Law: ") && c.law.contains("\nSource: "), "{}", c.name);
-            let told = c.parameters.iter().chain(&c.inputs).chain(&c.outputs);
+            let told = c.parameters.iter().chain(&c.constants).chain(&c.inputs).chain(&c.outputs);
             told.for_each(|e| assert!(!e.doc.is_empty(), "{}: what is {}?", c.name, e.name));
             let source = c.law.rsplit("Source: ").next().unwrap_or_default();
             let keys = source.split('[').skip(1).filter_map(|rest| rest.split_once(']')).map(|(key, _)| key);
@@ -698,7 +698,13 @@ fn page() -> String {
         for c in &library.components {
             page += &format!("\n### {}\n\n{}: `{}`\n\n{}\n\n", c.name, c.doc, c.usage(), c.law.replace('\n', "\n\n"));
             page += "| | | unit | default | |\n|---|---|---|---|---|\n";
-            let lists = [("port", &c.ports), ("param", &c.parameters), ("in", &c.inputs), ("out", &c.outputs)];
+            let lists = [
+                ("port", &c.ports),
+                ("param", &c.parameters),
+                ("const", &c.constants),
+                ("in", &c.inputs),
+                ("out", &c.outputs),
+            ];
             for (what, e) in lists.iter().flat_map(|(what, list)| list.iter().map(move |e| (what, e))) {
                 let [unit, default] = [&e.unit, &e.default].map(|text| text.clone().unwrap_or_default());
                 page += &format!("| {what} | `{}` | {unit} | {default} | {} |\n", e.name, e.doc);

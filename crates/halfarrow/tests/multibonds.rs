@@ -1015,3 +1015,53 @@ fn axes_of_cut_joints_of_any_length_are_the_same() {
         ends.iter().for_each(|end| end.iter().zip(ends[0]).for_each(|(found, wanted)| close(*found, wanted, 1e-8)));
     }
 }
+
+/// A conical pendulum turns at `sqrt(g/(l cos(angle)))`, and one that is let go from the side falls at g.
+#[test]
+fn point_masses_are_pendulums_of_textbooks() {
+    let cone = |w: f64| {
+        format!(
+            "model Cone\nimport std.multibody\nWorld:world -> Revolute:swivel(w0 = {w}) -> Revolute:pin(n = [0, 1, 0], q0 = -0.6 rad)\n\
+             pin -> PointMass:bob(m = 2 kg, c = [0, 0, -0.5])\n"
+        )
+    };
+    let steady = f64::sqrt(9.81 / (0.5 * f64::cos(0.6)));
+    let done = run(&cone(steady), &Run { to: 1.0, rtol: 1e-10, ..Run::default() });
+    close(last(&done, "pin.q"), -0.6, 1e-8);
+    close(last(&done, "swivel.q"), steady, 1e-8);
+    let side = "model Side\nimport std.multibody\nWorld:world -> Revolute:pin(n = [0, 1, 0]) -> FixedTranslation:arm(d = [0.4, 0, 0]) -> PointMass:bob(m = 3 kg)\n";
+    let done = run(side, &Run { to: 1e-6, ..Run::default() });
+    close(last(&done, "pin.speed") * 0.4 / 1e-6, 9.81, 1e-6);
+}
+
+/// A pendulum whose pivot is shaken, and one on a turntable, by signals and by joints that sources drive.
+#[test]
+fn what_a_signal_moves_has_its_velocity() {
+    let end = |pivot: &str| {
+        let text = format!(
+            "model Led\nimport std.multibody\nWorld:world -> {pivot} -> Revolute:pin(n = [0, 1, 0], q0 = 0.2 rad) -> 1[frame]:arm\n\
+             arm -> Body:bob(m = 2 kg, J = diag([0.1, 0.1, 0.01]), c = [0, 0, -1])\narm -> FrameSensor:s\n"
+        );
+        let driven = [
+            "1:way -> slide.axis\nSf:shake(0.3*cos(3*t)) -> way\n",
+            "1:way -> turn.axis\nSf:turn_it(1 + 0.5*cos(t)) -> way\n",
+        ];
+        let more = if pivot.contains("slide") {
+            driven[0]
+        } else if pivot.contains("turn(") {
+            driven[1]
+        } else {
+            ""
+        };
+        let done = run(&format!("{text}{more}"), &Run { to: 2.0, rtol: 1e-10, ..Run::default() });
+        ["pin.q", "pin.speed", "s.r[1]", "s.v[1]", "s.v[2]"].map(|name| last(&done, name))
+    };
+    for (led, joint) in [
+        ("DrivenTranslation:led(d = [0.1*sin(3*t), 0, 0])", "Prismatic:slide(n = [1, 0, 0])"),
+        ("DrivenRotation:led(angle = t + 0.5*sin(t))", "Revolute:turn()"),
+    ] {
+        for (found, expected) in end(led).into_iter().zip(end(joint)) {
+            close(found, expected, 1e-7);
+        }
+    }
+}

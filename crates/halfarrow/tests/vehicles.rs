@@ -83,6 +83,71 @@ fn the_magic_formula_gives_the_forces_of_another_implementation() {
     }
 }
 
+/// Mx and My by the formulas of Besselink, Schmeitz and Pacejka (2010), written down anew; and what a file says in radians.
+#[test]
+fn overturning_and_rolling_resistance_go_as_published() {
+    let numbers = [
+        ("FITTYP", 61.0),
+        ("UNLOADED_RADIUS", 0.3),
+        ("FNOMIN", 4000.0),
+        ("PCX1", 1.5),
+        ("PDX1", 1.0),
+        ("PKX1", 20.0),
+        ("PCY1", 1.3),
+        ("PDY1", 1.0),
+        ("PKY1", -15.0),
+        ("PKY2", 1.7),
+        ("QSX1", 0.01),
+        ("QSX2", 0.8),
+        ("QSX3", 0.02),
+        ("QSX4", 5.0),
+        ("QSX5", 1.0),
+        ("QSX6", 2.0),
+        ("QSX7", 0.7),
+        ("QSX8", 0.3),
+        ("QSX9", 0.6),
+        ("QSX10", 0.2),
+        ("QSX11", 4.0),
+        ("QSX12", 0.4),
+        ("QSX13", 0.05),
+        ("QSX14", 0.6),
+        ("QSY1", 0.01),
+        ("QSY2", 0.1),
+        ("QSY3", 0.002),
+        ("QSY4", 1e-4),
+        ("QSY5", 0.1),
+        ("QSY6", 0.05),
+        ("QSY7", 0.9),
+    ];
+    let lines: String = numbers.iter().map(|(name, value)| format!("{name} = {value}\n")).collect();
+    let file = format!("[UNITS]\nLENGTH = 'meter'\nANGLE = 'radians'\n[MODEL]\n{lines}");
+    let c = |name: &str| numbers.iter().find(|n| n.0 == name).expect("it is there").1;
+    for (fz, alpha, camber) in [(2000.0, 0.05, 0.05), (5000.0, -0.1, -0.1), (3000.0, 0.0, 0.0)] {
+        let text = format!(
+            "MagicFormula:m(file = \"six.tir\", Fz = {fz}, kappa = 0.05, alpha = {alpha}, gamma = {camber}, Vx = 20)\n"
+        );
+        let read = still(&text, &[("six.tir", &file)]);
+        let (fx, fy, g) = (read("m.Fx"), read("m.Fy"), f64::sin(camber));
+        let (r, f0) = (c("UNLOADED_RADIUS"), c("FNOMIN"));
+        let [fy0, fz0] = [fy / f0, fz / f0];
+        let steep = f64::cos(c("QSX5") * (c("QSX6") * fz0).powi(2).atan())
+            * f64::sin(c("QSX7") * g + c("QSX8") * (c("QSX9") * fy0).atan());
+        let by_load = c("QSX1") - c("QSX2") * g - c("QSX12") * g * g.abs()
+            + c("QSX3") * fy0
+            + c("QSX4") * steep
+            + c("QSX10") * (c("QSX11") * fz0).atan() * g;
+        let overturning = r * (fz * by_load + fy * (c("QSX13") + c("QSX14") * g.abs()));
+        let speed = 20.0 / 16.6;
+        let rolling = c("QSY1")
+            + c("QSY2") * fx / f0
+            + c("QSY3") * speed
+            + c("QSY4") * f64::powi(speed, 4)
+            + (c("QSY5") + c("QSY6") * fz0) * g * g;
+        close(read("m.Mx"), overturning, 1e-12 * r * fz);
+        close(read("m.My"), -r * f0 * rolling * fz0.powf(c("QSY7")), 1e-12 * r * fz);
+    }
+}
+
 /// What a component reads by a name that its user gives goes with the model, as tables do.
 #[test]
 fn a_model_takes_its_tyre_with_it() {
@@ -306,17 +371,17 @@ fn tyres_have_a_carcass_and_a_side() {
 /// steered it goes round.
 #[test]
 fn a_car_runs_straight_and_goes_round() {
-    let corner = |name: &str, px: f64, py: f64, mirrored: u8, angle: &str| {
+    let corner = |name: &str, px: f64, py: f64, mirrored: u8, turned: &str| {
         format!(
-            "chassis -> FixedTranslation:m{name}(d = [{px}, {py}, -0.22]) -> Prismatic:s{name} -> 1[frame]:c{name}\n1:r{name} -> s{name}.axis\nr{name} -> C:k{name}(k = 30e3, q = s{name}.way + 0.0981)\nr{name} -> R:d{name}(2500)\nc{name} -> FixedRotation:t{name}(n = [0, 0, 1], angle = {angle}) -> Wheel:w{name}(m = 25, J_axle = 1.2, J_across = 0.7, w0 = 20/0.333) -> Tyre:{name}(file = \"sedan.tir\", mirrored = {mirrored})\n"
+            "chassis -> FixedTranslation:m{name}(d = [{px}, {py}, -0.22]) -> Prismatic:s{name} -> 1[frame]:c{name}\n1:r{name} -> s{name}.axis\nr{name} -> C:k{name}(k = 30e3, q = s{name}.way + 0.0981)\nr{name} -> R:d{name}(2500)\nc{name} -> {turned} -> Wheel:w{name}(m = 25, J_axle = 1.2, J_across = 0.7, w0 = 20/0.333) -> Tyre:{name}(file = \"sedan.tir\", mirrored = {mirrored})\n"
         )
     };
     let text = [
         "param hands = \"still.csv\"\nSteerTable:steer(file = hands)\nWorld:world -> Prismatic:x(n = [1, 0, 0], v0 = 20) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z(q0 = 0.55) -> Revolute:yaw -> Revolute:pitch(n = [0, 1, 0]) -> Revolute:roll(n = [1, 0, 0]) -> 1[frame]:chassis\nchassis -> Body:body(m = 1200, J = diag([400, 1500, 1700]))\n",
-        &corner("fl", 1.2, 0.75, 0, "steer.angle"),
-        &corner("fr", 1.2, -0.75, 1, "steer.angle"),
-        &corner("rl", -1.4, 0.75, 0, "0"),
-        &corner("rr", -1.4, -0.75, 1, "0"),
+        &corner("fl", 1.2, 0.75, 0, "DrivenRotation:tfl(angle = steer.angle)"),
+        &corner("fr", 1.2, -0.75, 1, "DrivenRotation:tfr(angle = steer.angle)"),
+        &corner("rl", -1.4, 0.75, 0, "FixedRotation:trl(n = [0, 0, 1], angle = 0)"),
+        &corner("rr", -1.4, -0.75, 1, "FixedRotation:trr(n = [0, 0, 1], angle = 0)"),
     ];
     let model = model_with(&text.concat(), &[("still.csv", "t,angle\n0,0\n10,0\n")]);
     let drive = |model: &Model| {

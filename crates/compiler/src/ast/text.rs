@@ -182,7 +182,7 @@ fn write_state(out: &mut String, s: &State) {
 
 fn write_component(out: &mut String, c: &Component, level: usize) {
     *out += &format!("component {}(", c.name.text);
-    let groups = [("param", &c.params), ("port", &c.ports), ("in", &c.ins), ("out", &c.outs)];
+    let groups = [("param", &c.params), ("const", &c.consts), ("port", &c.ports), ("in", &c.ins), ("out", &c.outs)];
     let groups: Vec<_> = groups.into_iter().filter(|(_, list)| !list.is_empty()).collect();
     for (i, (word, list)) in groups.iter().enumerate() {
         *out += if i == 0 { "" } else { "; " };

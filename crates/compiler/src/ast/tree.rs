@@ -196,6 +196,8 @@ pub struct Component {
     pub name: Name,
     /// Its parameters, with defaults.
     pub params: Vec<Declaration>,
+    /// What it is made for, with defaults: numbers and parameters that stand where it has the name.
+    pub consts: Vec<Declaration>,
     /// Its ports.
     pub ports: Vec<Declaration>,
     /// The signals it reads; a value is the default.
@@ -206,6 +208,13 @@ pub struct Component {
     pub doc: Option<Doc>,
     /// What stands between the braces.
     pub body: Vec<Statement>,
+}
+
+impl Component {
+    /// All that an instance may be given.
+    pub fn arguments(&self) -> impl Iterator<Item = &Declaration> {
+        self.params.iter().chain(&self.consts).chain(&self.ins)
+    }
 }
 
 /// `port frame { bond twist[6]; in R[3, 3]; in r[3] } "doc"`: a kind of port, of several bonds and directed signals.

@@ -9,7 +9,7 @@ use super::scope::{self, DeclId, DeclKind, Here, Valued};
 use super::value::Reading;
 use super::vectors::Shaped;
 use super::{HeldId, HeldKind, InputId, Meaning, Parameter, ParameterKind};
-use crate::algebra::{Expr, Facts, Node};
+use crate::algebra::{Expr, Facts, Node, Symbol};
 use crate::ast::{self, BinaryOp, ExprKind};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
@@ -231,7 +231,7 @@ impl<'a> Builder<'a, '_> {
             ExprKind::Path(path) => match self.decl_of(here, path, (formals, &[])) {
                 Some(decl) => {
                     let kind = &self.flat.names.decls[decl].kind;
-                    matches!(kind, DeclKind::Let(_) | DeclKind::Output(_) | DeclKind::Joined(_))
+                    matches!(kind, DeclKind::Let(_) | DeclKind::MadeFor(_) | DeclKind::Output(_) | DeclKind::Joined(_))
                 }
                 None => self
                     .family_of(here, path, formals)
@@ -321,7 +321,7 @@ impl<'a> Builder<'a, '_> {
 
     fn evaluate_one(&mut self, decl: DeclId) {
         let d = &self.flat.names.decls[decl];
-        if let DeclKind::Parameter { value: Some(e), .. } | DeclKind::Let(Some(e)) = d.kind
+        if let DeclKind::Parameter { value: Some(e), .. } | DeclKind::Let(Some(e)) | DeclKind::MadeFor(Some(e)) = d.kind
             && d.item.is_empty()
             && let Some(text) = self.text_of(d.reads, e)
         {
@@ -332,7 +332,7 @@ impl<'a> Builder<'a, '_> {
             DeclKind::Parameter { value, constant } => self.parameter(decl, value, constant),
             DeclKind::Input(value) => self.input_default(decl, value),
             DeclKind::Discrete(value) => self.discrete(decl, value),
-            DeclKind::Let(value) => self.named(decl, value, false),
+            DeclKind::Let(value) | DeclKind::MadeFor(value) => self.named(decl, value, false),
             DeclKind::Output(value) => self.named(decl, value, true),
             DeclKind::Function(f) => self.function(decl, f),
             DeclKind::State(_) => {}
@@ -419,9 +419,19 @@ impl<'a> Builder<'a, '_> {
 
     /// Whether an expression reads parameters only; says so if not.
     pub fn only_parameters(&mut self, expr: Expr, span: Span, what: &str) -> bool {
-        let other =
-            self.exprs.symbols_of(expr).into_iter().find(|s| !matches!(self.meaning(*s), Some(Meaning::Parameter(_))));
-        let Some(other) = other else { return true };
+        let Some((name, kind)) = self.no_parameter(expr) else { return true };
+        let title = format!("{what} must be known before the run, but reads `{name}`");
+        self.fault(
+            Diagnostic::error(codes::N016, title, span, format!("`{name}` is {kind}"))
+                .hint("use numbers and parameters; for a value that varies write `let`"),
+        );
+        false
+    }
+
+    /// What an expression reads beside parameters, and what that is.
+    fn no_parameter(&self, expr: Expr) -> Option<(String, &'static str)> {
+        let is_parameter = |s: &Symbol| matches!(self.meaning(*s), Some(Meaning::Parameter(_)));
+        let other = self.exprs.symbols_of(expr).into_iter().find(|s| !is_parameter(s))?;
         let kind = match self.meaning(other) {
             Some(Meaning::Time) => "time",
             Some(Meaning::Input(_)) => "an input",
@@ -430,13 +440,65 @@ impl<'a> Builder<'a, '_> {
             _ if self.role(other) == Some(Role::Reaction) => "a variable of a constraint",
             _ => "a variable of an element",
         };
-        let name = self.exprs.name(other).to_string();
-        let title = format!("{what} must be known before the run, but reads `{name}`");
-        self.fault(
-            Diagnostic::error(codes::N016, title, span, format!("`{name}` is {kind}"))
-                .hint("use numbers and parameters; for a value that varies write `let`"),
-        );
-        false
+        Some((self.exprs.name(other).to_string(), kind))
+    }
+
+    /// Says that what an instance is given for a `const` of its component varies, if it does.
+    fn refuse_varying(&mut self, decl: DeclId, value: Expr, span: Span) {
+        let Some((read, kind)) = self.no_parameter(value) else { return };
+        let d = &self.flat.names.decls[decl];
+        let title = format!("`{}` must not vary, but reads `{read}`", d.name);
+        let fault = Diagnostic::error(codes::N016, title, span, format!("`{read}` is {kind}"));
+        let fault = fault.also(d.span, "a `const` of the component");
+        self.fault(fault.hint(
+            "use numbers and parameters: what moves has a velocity too, as joints have whose axes sources drive, and \
+             `DrivenTranslation` and `DrivenRotation` of std.multibody",
+        ));
+    }
+
+    /// Says that one number stands for a whole vector or matrix of a component, if it does: 0.1 is no matrix of inertia.
+    fn refuse_one_for_all(&mut self, decl: DeclId, value: &Value, e: &'a ast::Expr) {
+        let d = &self.flat.names.decls[decl];
+        let is_given = d.reads.scope != d.scope && d.item.iter().all(|&i| i == 1);
+        if !is_given || self.exprs.is_zero(value.expr) || !self.is_one_number(d.reads, e) {
+            return;
+        }
+        let d = &self.flat.names.decls[decl];
+        let (what, hint) = match d.item.len() {
+            1 => ("a vector", "write it with its entries, `[x, y, z]`"),
+            _ => ("a matrix", "write it with its rows, or its diagonal: `diag([a, b, c])`"),
+        };
+        let whole = d.name.split('[').next().unwrap_or(&d.name);
+        let title = format!("`{whole}` is {what}, and one number is given for all of it");
+        let fault = Diagnostic::error(codes::N007, title, e.span, "one number").also(d.span, "declared here");
+        self.fault(fault.hint(hint));
+    }
+
+    /// Whether an expression is a single number, as far as its text tells.
+    fn is_one_number(&mut self, here: Here, e: &'a ast::Expr) -> bool {
+        match &e.kind {
+            ExprKind::Number(_) => true,
+            ExprKind::Unary(u) => self.is_one_number(here, &u.operand),
+            ExprKind::Binary(b) => self.is_one_number(here, &b.left) && self.is_one_number(here, &b.right),
+            ExprKind::Path(path) => {
+                let Some(decl) = self.decl_of(here, path, (&[], &[])) else {
+                    return matches!(&path.parts[..], [one] if ["t", "pi"].contains(&one.name.text.as_str()));
+                };
+                let d = &self.flat.names.decls[decl];
+                match d.kind {
+                    DeclKind::Parameter { .. } | DeclKind::Input(_) | DeclKind::Discrete(_) => d.item.is_empty(),
+                    DeclKind::Let(Some(value)) | DeclKind::MadeFor(Some(value)) => {
+                        d.item.is_empty() && self.is_one_number(d.reads, value)
+                    }
+                    _ => false,
+                }
+            }
+            ExprKind::Call(call) => {
+                let of_numbers = call.args.iter().all(|arg| self.is_one_number(here, &arg.value));
+                of_numbers && !super::vectors::is_of_vectors(&call.function.text)
+            }
+            _ => false,
+        }
     }
 
     /// A value with the unit that stands after `:`. A value without a unit is a number of it.
@@ -519,6 +581,7 @@ impl<'a> Builder<'a, '_> {
         let d = &self.flat.names.decls[decl];
         if !d.item.is_empty() {
             let Some(value) = self.number(&d.reading(), e) else { return };
+            self.refuse_one_for_all(decl, &value, e);
             self.values[decl] = Some(self.name_value(decl, value, &[], e.span, output));
             return;
         }
@@ -536,6 +599,10 @@ impl<'a> Builder<'a, '_> {
 
     /// Gives a name to a value, or to an entry of a vector or matrix.
     fn name_value(&mut self, decl: DeclId, value: Value, indices: &[i64], span: Span, output: bool) -> Value {
+        let d = &self.flat.names.decls[decl];
+        if matches!(d.kind, DeclKind::MadeFor(_)) {
+            self.refuse_varying(decl, value.expr, span);
+        }
         let d = &self.flat.names.decls[decl];
         let mut value = self.with_unit(value, d.unit, span);
         if !indices.is_empty() {

@@ -232,7 +232,9 @@ impl<'a> Repeats<'a> {
     fn declared(&mut self, names: &Names<'a>, decl: DeclId, span: Span) -> Result<Rational, Unknown> {
         let d = &names.decls[decl];
         let value = match d.kind {
-            DeclKind::Parameter { value, .. } | DeclKind::Let(value) => value.filter(|_| d.unit.is_none()),
+            DeclKind::Parameter { value, .. } | DeclKind::Let(value) | DeclKind::MadeFor(value) => {
+                value.filter(|_| d.unit.is_none())
+            }
             _ => None,
         };
         let what = match d.kind {

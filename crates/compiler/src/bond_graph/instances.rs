@@ -125,7 +125,7 @@ impl<'a> Flat<'a> {
         element: &'a ast::Element,
         ports: &'a [ast::Name],
     ) {
-        let known: Vec<&str> = component.params.iter().chain(&component.ins).map(|d| d.name.text.as_str()).collect();
+        let known: Vec<&str> = component.arguments().map(|d| d.name.text.as_str()).collect();
         let mut given: FxHashMap<&str, Span> = FxHashMap::default();
         for arg in &element.args {
             let Some(label) = &arg.label else {
@@ -163,7 +163,7 @@ impl<'a> Flat<'a> {
             let labelled = element.args.iter().filter(|a| a.label.as_ref().is_some_and(|l| l.name.text == name));
             labelled.map(|a| &a.value).next()
         };
-        for d in component.params.iter().chain(&component.ins) {
+        for d in component.arguments() {
             if let Some(kind) = self.kind_of_port(d) {
                 self.port_of_kind(id, d, kind, Way::Arrives);
                 continue;
@@ -175,10 +175,11 @@ impl<'a> Flat<'a> {
             if value.is_none() {
                 self.missing_argument(component, element, d);
             }
-            let is_param = component.params.iter().any(|p| std::ptr::eq(p, d));
-            let kind = match is_param {
-                true => DeclKind::Parameter { value, constant: false },
-                false => DeclKind::Let(value),
+            let is_among = |list: &[ast::Declaration]| list.iter().any(|one| std::ptr::eq(one, d));
+            let kind = match (is_among(&component.params), is_among(&component.consts)) {
+                (true, _) => DeclKind::Parameter { value, constant: false },
+                (_, true) => DeclKind::MadeFor(value),
+                _ => DeclKind::Let(value),
             };
             self.declare_whole(own, reads, d, kind);
         }

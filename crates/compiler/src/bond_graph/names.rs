@@ -179,7 +179,7 @@ fn kind_of(decl: &Decl<'_>) -> NameKind {
         DeclKind::Parameter { constant: false, .. } => NameKind::Parameter,
         DeclKind::Parameter { constant: true, .. } => NameKind::Constant,
         DeclKind::Input(_) => NameKind::Input,
-        DeclKind::Let(_) | DeclKind::Joined(_) => NameKind::Let,
+        DeclKind::Let(_) | DeclKind::MadeFor(_) | DeclKind::Joined(_) => NameKind::Let,
         DeclKind::Output(_) => NameKind::Output,
         DeclKind::State(_) => NameKind::State,
         DeclKind::Discrete(_) => NameKind::Discrete,

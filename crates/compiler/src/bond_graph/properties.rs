@@ -8,7 +8,7 @@ use crate::diagnostic::{Diagnostic, codes, nearest};
 use crate::span::Span;
 use std::rc::Rc;
 
-/// What may stand in the section `[UNITS]`: numbers are read as they are written, so they have to be SI.
+/// What may stand in the section `[UNITS]`, one or several: numbers are read as they are written, so they have to be SI.
 const SI: [&str; 14] =
     ["meter", "metre", "m", "newton", "n", "radian", "rad", "kg", "kilogram", "second", "sec", "s", "pascal", "pa"];
 
@@ -62,7 +62,8 @@ pub(super) fn parse(text: &str) -> Result<Vec<Property>, PropertyError> {
         let Some((name, value)) = line.split_once('=') else { continue };
         let property = Property { name: name.trim().to_string(), value: value.trim().to_string(), line: i + 1 };
         let unit = property.value.trim_matches(['\'', '"']).to_ascii_lowercase();
-        if in_units && !SI.contains(&unit.as_str()) {
+        let singular = unit.strip_suffix('s').unwrap_or(&unit);
+        if in_units && ![unit.as_str(), singular].iter().any(|unit| SI.contains(unit)) {
             return Err(PropertyError::NotSi(property));
         }
         all.push(property);

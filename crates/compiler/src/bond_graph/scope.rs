@@ -162,6 +162,8 @@ pub(super) enum DeclKind<'a> {
     Input(Option<&'a ast::Expr>),
     /// `let` and what is joined to an `in` of an instance.
     Let(Option<&'a ast::Expr>),
+    /// What is given for a `const` of a component: as `let`, but of numbers and parameters alone.
+    MadeFor(Option<&'a ast::Expr>),
     /// `output`, and an `out` of a component that has its value there.
     Output(Option<&'a ast::Expr>),
     /// `state`.
@@ -179,7 +181,9 @@ impl<'a> DeclKind<'a> {
     pub fn value(&self) -> Option<&'a ast::Expr> {
         match *self {
             DeclKind::Parameter { value, .. } | DeclKind::Input(value) => value,
-            DeclKind::Let(value) | DeclKind::Output(value) | DeclKind::Discrete(value) => value,
+            DeclKind::Let(value) | DeclKind::MadeFor(value) | DeclKind::Output(value) | DeclKind::Discrete(value) => {
+                value
+            }
             DeclKind::State(_) | DeclKind::Function(_) | DeclKind::Joined(_) => None,
         }
     }

@@ -8,11 +8,42 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::ids::Id;
 
 /// The warnings of this stage, in the order of the elements: junctions that join nothing, parts that nothing connects,
-/// fields whose laws come from no energy.
+/// fields whose laws come from no energy, displacements that inputs move.
 pub fn warnings(graph: &BondGraph) -> Vec<Diagnostic> {
     let mut found = lonely_junctions(graph);
     found.extend(isolated_parts(graph));
     found.extend(fields_without_energy(graph));
+    found.extend(displaced_by_inputs(graph));
+    found
+}
+
+/// Storages whose displacement reads an input: its rate is part of their flow, and nothing in the text gives it. A source that
+/// reads an input may be that rate.
+fn displaced_by_inputs(graph: &BondGraph) -> Vec<Diagnostic> {
+    let inputs: BTreeMap<Symbol, &str> = graph.inputs.values().map(|input| (input.symbol, &*input.name)).collect();
+    let read = |e: Expr| graph.exprs.symbols_of(e).into_iter().find_map(|symbol| inputs.get(&symbol).copied());
+    let leads = |element: &Element| match element.kind {
+        Kind::FlowSource { value } | Kind::EffortSource { value } => read(value).is_some(),
+        _ => false,
+    };
+    if inputs.is_empty() || graph.elements.values().any(leads) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for element in graph.elements.values() {
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { continue };
+        let displaced = storage.laws.iter().find_map(|law| match law {
+            StorageLaw::Known { displacement, .. } => read(*displacement),
+            _ => None,
+        });
+        let Some(input) = displaced else { continue };
+        let title = format!("the displacement of `{}` moves with the input `{input}`, its flow does not", element.name);
+        found.push(
+            Diagnostic::warning(codes::L016, title, element.span, "its rate and its flow part as the input moves")
+                .note("what is constant is fine; where the input moves, a run is refused by its audit")
+                .hint("join a source of flow to it that gives the rate, as another input"),
+        );
+    }
     found
 }
 

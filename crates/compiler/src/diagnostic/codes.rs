@@ -104,6 +104,7 @@ codes! {
     L013 "a variable that one event changes twice";
     L014 "a set-valued law that cannot be read";
     L015 "a constraint on displacements that jumps";
+    L016 "a displacement that moves with an input (warning)";
     I001 "a start value of the wrong kind";
     I002 "a start value or a guess given twice";
     I003 "start values that contradict each other or a constraint";

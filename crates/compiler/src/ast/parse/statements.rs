@@ -401,6 +401,7 @@ impl Parser<'_> {
         let mut component = Component {
             name: name.unwrap_or(Name { text: String::new(), span: self.gap() }),
             params: Vec::new(),
+            consts: Vec::new(),
             ports: Vec::new(),
             ins: Vec::new(),
             outs: Vec::new(),
@@ -415,7 +416,7 @@ impl Parser<'_> {
         Some(component)
     }
 
-    /// `(param a, b = 1; port p, q; in u; out y)`.
+    /// `(param a, b = 1; const d[3]; port p, q; in u; out y)`.
     fn signature(&mut self, component: &mut Component) {
         let open = self.span();
         self.bump();
@@ -441,11 +442,12 @@ impl Parser<'_> {
         let word = self.token();
         let list = match self.text_of(word) {
             "param" => &mut component.params,
+            "const" => &mut component.consts,
             "port" => &mut component.ports,
             "in" => &mut component.ins,
             "out" => &mut component.outs,
             _ => {
-                self.expected("`param`, `port`, `in` or `out`");
+                self.expected("`param`, `const`, `port`, `in` or `out`");
                 self.skip();
                 return;
             }
@@ -464,7 +466,8 @@ impl Parser<'_> {
 
     /// Whether after this comma `port p` comes, where a semicolon should stand.
     fn begins_group(&self) -> bool {
-        matches!(self.text_of(self.ahead(1)), "param" | "port" | "in" | "out") && self.ahead(2).kind == TokenKind::Ident
+        matches!(self.text_of(self.ahead(1)), "param" | "const" | "port" | "in" | "out")
+            && self.ahead(2).kind == TokenKind::Ident
     }
 
     fn expect_block(&mut self) -> Vec<Statement> {
