@@ -318,3 +318,36 @@ def test_what_a_bar_raises_ends_the_run(long: ha.Model) -> None:
 def test_tqdm(long: ha.Model, capsys: pytest.CaptureFixture[str]) -> None:
     long.simulate(to=2000, every=100, progress=True)
     assert "Long" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"to": "1 s"},
+        {"to": None},
+        {"to": 1.0, "every": "0.1 s"},
+        {"to": 1.0, "step": "1 ms", "method": "rk4"},
+        {"to": 1.0, "rtol": "1e-6"},
+        {"to": True},
+    ],
+)
+def test_what_is_no_number_is_told(asked: dict[str, object]) -> None:
+    spring = ha.model("model A\nparam k = 50 N/m\nSe:p(1) -> 1:v -> I:m(2)\nv -> C:c(k = k)\n")
+    with pytest.raises(ha.UsageError, match="give a number"):
+        spring.simulate(**asked)  # type: ignore[arg-type]
+    with pytest.raises(ha.UsageError, match="2 dimensions"):
+        spring.sweep(to=1.0, k=[[1.0, 2.0], [3.0, 4.0]])
+    with pytest.raises(ha.UsageError, match="give a number of seconds"):
+        spring.stepper(step="1 ms")  # type: ignore[arg-type]
+    stepper = spring.stepper(step=1e-3)
+    with pytest.raises(ha.UsageError, match="in SI units"):
+        stepper["k"] = "0.06 kN/m"  # type: ignore[assignment]
+
+
+def test_a_snapshot_of_another_model_is_refused() -> None:
+    spring = ha.model("model A\nparam k = 50 N/m\nSe:p(1) -> 1:v -> I:m(2)\nv -> C:c(k = k)\n")
+    mass = ha.model("model B\nSe:p(1) -> 1:v -> I:m(2)\n")
+    saved = spring.stepper(step=1e-3).save()
+    with pytest.raises(ha.UsageError, match="another model"):
+        mass.stepper(step=1e-3).restore(saved)
+    spring.stepper(step=1e-3, k=60.0).restore(saved)

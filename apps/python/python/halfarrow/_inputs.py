@@ -70,6 +70,13 @@ def numbers(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return np.require(values, np.float64, ["C_CONTIGUOUS", "ALIGNED"])
 
 
+def number(name: str, value: Any, unit: str = "") -> float:
+    """One number, and nothing that only can be made one: ``"1 s"``, ``True``."""
+    if isinstance(value, (bool, np.bool_)) or not hasattr(value, "__float__") or np.ndim(value):
+        raise UsageError(f"{name} is {value!r}: give a number{unit}")
+    return float(value)
+
+
 def all_given(values: Mapping[str, InputLike], to: float, sample: float) -> list[tuple[str, Given]]:
     """All of them, in order."""
     return [(name, given(name, value, to, sample)) for name, value in values.items()]

@@ -29,7 +29,7 @@ from ._errors import (
     choice,
     unknown,
 )
-from ._inputs import InputLike, all_given, numbers
+from ._inputs import InputLike, all_given, number, numbers
 from ._progress import Bar
 from ._tables import as_html, record
 from ._words import hint, in_python
@@ -424,13 +424,13 @@ class Model:
             ModelWarning: something else is to be known.
         """
         set_values, given = self._split(values, parameters, inputs)
-        if sample is None:
-            sample = every or step or to / _POINTS
         options = _options(
             to=to, every=every, at=_times(at), method=method, step=step, rtol=rtol, atol=atol, form=form, start=start,
             record=_recorded(record, also), project=project, minimum_norm=minimum_norm, stiffness=stiffness,
             damping=damping, execution=execution, sensitivities=[],
         )  # fmt: skip
+        if sample is None:
+            sample = every or step or to / _POINTS
         with Bar(progress, to, self.name, "s") as bar:
             ended = self._core.simulate(options, all_given(given, to, sample), set_values, bar.reach if bar else None)
             bar.reach(ended.reached)
@@ -828,6 +828,9 @@ class Model:
             AuditWarning: a set that was audited misses a law or a balance.
         """
         several, given = self._several(values, parameters, inputs)
+        for name, value in several.items():
+            if np.ndim(value) > 1:
+                raise UsageError(f"`{name}` is given values in {np.ndim(value)} dimensions: give a list of numbers")
         table = _samples(samples)
         options = _options(
             to=to, every=every, at=[], sensitivities=[], method=method or ("auto" if step is None else "rk4"), step=step,
@@ -964,6 +967,7 @@ class Model:
             values: Parameters and inputs whose names are words; an input begins with this number.
         """
         choice("method", method, _FIXED)
+        number("step", step, " of seconds")
         set_values, given = self._split(values, parameters, None)
         names = self._names
         settable = {**{name: False for name, p in names.parameters.items()}, **{name: True for name in names.inputs}}
@@ -1203,6 +1207,10 @@ def _options(**options: Any) -> dict[str, Any]:
     choice("form", options["form"], _FORMS)
     choice("execution", options["execution"], ("auto", "bytecode", "machine"))
     _start(options["start"])
+    number("to", options["to"], " of seconds")
+    for name, unit in (("every", " of seconds"), ("step", " of seconds"), ("rtol", ""), ("atol", "")):
+        if options[name] is not None:
+            number(name, options[name], unit)
     return options
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from . import _halfarrow
 from ._errors import UsageError, unknown
+from ._inputs import number
 from ._tables import record
 from .result import Drift
 
@@ -93,6 +94,7 @@ class Stepper:
         is_input = self._settable.get(name)
         if is_input is None:
             raise unknown("input or parameter", name, self._settable)
+        value = number(f"`{name}`", value, ", in its declared unit" if is_input else ", in SI units")
         if is_input:
             self._run().set_input(name, value)
         else:
