@@ -79,7 +79,7 @@ pub(crate) fn rates(
             unchecked.push(format!("the rate of {}: its value is not known", signal.name));
             continue;
         };
-        if scales.is_neglected(graph, signal.symbol) || greatest(x) < NOTHING {
+        if greatest(x) < NOTHING {
             continue;
         }
         let reader = match values.reader(&[signal.rate]) {

@@ -346,12 +346,6 @@ impl Scales {
         }
     }
 
-    /// Whether the method neglected all that a variable has ever been.
-    pub fn is_neglected(&self, graph: &BondGraph, symbol: Symbol) -> bool {
-        let place = self.places.find(self.of(graph, symbol));
-        place.is_some_and(|place| self.neglected.get(&place).is_some_and(|least| self.seen[place] <= *least))
-    }
-
     /// Takes note of the part of what acts that the method may miss.
     pub fn tolerate(&mut self, part: f64) {
         self.tolerance = self.tolerance.max(part);

@@ -164,6 +164,17 @@ impl Component {
         }
     }
 
+    /// What stands in its head, by the words for it.
+    pub fn groups(&self) -> [(&'static str, &[Entry]); 5] {
+        [
+            ("port", &self.ports),
+            ("param", &self.parameters),
+            ("const", &self.constants),
+            ("in", &self.inputs),
+            ("out", &self.outputs),
+        ]
+    }
+
     /// How it is written with what it needs: `Resistor:name(r = …)`.
     pub fn usage(&self) -> String {
         let all = self.parameters.iter().chain(&self.constants).chain(&self.inputs);

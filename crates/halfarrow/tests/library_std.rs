@@ -698,14 +698,7 @@ fn page() -> String {
         for c in &library.components {
             page += &format!("\n### {}\n\n{}: `{}`\n\n{}\n\n", c.name, c.doc, c.usage(), c.law.replace('\n', "\n\n"));
             page += "| | | unit | default | |\n|---|---|---|---|---|\n";
-            let lists = [
-                ("port", &c.ports),
-                ("param", &c.parameters),
-                ("const", &c.constants),
-                ("in", &c.inputs),
-                ("out", &c.outputs),
-            ];
-            for (what, e) in lists.iter().flat_map(|(what, list)| list.iter().map(move |e| (what, e))) {
+            for (what, e) in c.groups().into_iter().flat_map(|(what, list)| list.iter().map(move |e| (what, e))) {
                 let [unit, default] = [&e.unit, &e.default].map(|text| text.clone().unwrap_or_default());
                 page += &format!("| {what} | `{}` | {unit} | {default} | {} |\n", e.name, e.doc);
             }

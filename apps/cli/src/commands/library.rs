@@ -44,9 +44,7 @@ fn component(library: &Library, c: &Component, page: Page) -> String {
         let dash = |text: &Option<String>| text.clone().unwrap_or_else(|| "-".into());
         [what.to_string(), e.name.clone(), dash(&e.default), dash(&e.unit), e.doc.clone()]
     };
-    let lists =
-        [("port", &c.ports), ("param", &c.parameters), ("const", &c.constants), ("in", &c.inputs), ("out", &c.outputs)];
-    let rows = lists.iter().flat_map(|(what, list)| list.iter().map(|e| row(what, e)));
+    let rows = c.groups().into_iter().flat_map(|(what, list)| list.iter().map(move |e| row(what, e)));
     let table = page.table(["", "name", "default", "unit", ""], rows);
     let usage = format!("import {}\n{}\n", library.name, c.usage());
     format!("{}: {}\n\n{}\n{usage}\n{table}\n{}\n", c.name, c.doc, page.lines(&c.law), c.text)

@@ -445,8 +445,10 @@ impl<'a> Builder<'a, '_> {
 
     /// Says that what an instance is given for a `const` of its component varies, if it does.
     fn refuse_varying(&mut self, decl: DeclId, value: Expr, span: Span) {
-        let Some((read, kind)) = self.no_parameter(value) else { return };
         let d = &self.flat.names.decls[decl];
+        let Some((read, kind)) = self.no_parameter(value).filter(|_| matches!(d.kind, DeclKind::MadeFor(_))) else {
+            return;
+        };
         let title = format!("`{}` must not vary, but reads `{read}`", d.name);
         let fault = Diagnostic::error(codes::N016, title, span, format!("`{read}` is {kind}"));
         let fault = fault.also(d.span, "a `const` of the component");
@@ -468,7 +470,7 @@ impl<'a> Builder<'a, '_> {
             1 => ("a vector", "write it with its entries, `[x, y, z]`"),
             _ => ("a matrix", "write it with its rows, or its diagonal: `diag([a, b, c])`"),
         };
-        let whole = d.name.split('[').next().unwrap_or(&d.name);
+        let whole = d.name.rsplit_once('[').map_or(&*d.name, |(whole, _)| whole);
         let title = format!("`{whole}` is {what}, and one number is given for all of it");
         let fault = Diagnostic::error(codes::N007, title, e.span, "one number").also(d.span, "declared here");
         self.fault(fault.hint(hint));
@@ -599,10 +601,7 @@ impl<'a> Builder<'a, '_> {
 
     /// Gives a name to a value, or to an entry of a vector or matrix.
     fn name_value(&mut self, decl: DeclId, value: Value, indices: &[i64], span: Span, output: bool) -> Value {
-        let d = &self.flat.names.decls[decl];
-        if matches!(d.kind, DeclKind::MadeFor(_)) {
-            self.refuse_varying(decl, value.expr, span);
-        }
+        self.refuse_varying(decl, value.expr, span);
         let d = &self.flat.names.decls[decl];
         let mut value = self.with_unit(value, d.unit, span);
         if !indices.is_empty() {

@@ -17,6 +17,9 @@ use crate::span::{FileId, Span};
 /// The greatest number of components inside one another.
 const MAX_DEPTH: usize = 64;
 
+/// The kind of a declaration with its value.
+type KindOf<'a> = fn(Option<&'a ast::Expr>) -> DeclKind<'a>;
+
 impl<'a> Flat<'a> {
     /// Makes a scope for an instance of a component and fills it.
     pub fn instance(
@@ -163,7 +166,10 @@ impl<'a> Flat<'a> {
             let labelled = element.args.iter().filter(|a| a.label.as_ref().is_some_and(|l| l.name.text == name));
             labelled.map(|a| &a.value).next()
         };
-        for d in component.arguments() {
+        let [params, consts, ins] = [&component.params, &component.consts, &component.ins];
+        let param = |value| DeclKind::Parameter { value, constant: false };
+        let groups: [(_, KindOf<'a>); 3] = [(params, param), (consts, DeclKind::MadeFor), (ins, DeclKind::Let)];
+        for (d, kind_of) in groups.into_iter().flat_map(|(list, kind_of)| list.iter().map(move |d| (d, kind_of))) {
             if let Some(kind) = self.kind_of_port(d) {
                 self.port_of_kind(id, d, kind, Way::Arrives);
                 continue;
@@ -175,13 +181,7 @@ impl<'a> Flat<'a> {
             if value.is_none() {
                 self.missing_argument(component, element, d);
             }
-            let is_among = |list: &[ast::Declaration]| list.iter().any(|one| std::ptr::eq(one, d));
-            let kind = match (is_among(&component.params), is_among(&component.consts)) {
-                (true, _) => DeclKind::Parameter { value, constant: false },
-                (_, true) => DeclKind::MadeFor(value),
-                _ => DeclKind::Let(value),
-            };
-            self.declare_whole(own, reads, d, kind);
+            self.declare_whole(own, reads, d, kind_of(value));
         }
         self.labels_use(id, element);
         for d in &component.outs {

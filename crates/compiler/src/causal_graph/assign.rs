@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::by_size::solve_part_by_size;
+use super::by_size::better_by_size;
 use super::ports::{CausalityPreferences, Solved, Virtual, is_imposed, solve_part};
 use super::repeated::without_repeated;
 use super::signals::{NodeId, signal_graph};
@@ -104,9 +104,7 @@ impl ConnectedPart<'_> {
         self.x.suppose(before.clone());
         let (_, preferences) = self.solve(&Strokes::new(graph), false);
         self.x.suppose(before);
-        let by_size = solve_part_by_size(self.x, graph, members, &preferences, point);
-        let by_size = by_size.filter(|found| found.tells_as_much_as(&solved));
-        let Some(by_size) = by_size.filter(|found| digits::cost(self.x, graph, found, point) < cost) else {
+        let Some(by_size) = better_by_size(self.x, graph, members, &preferences, point, (&solved, cost)) else {
             self.x.suppose(with_solved);
             return Ok(solved);
         };

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use super::Role;
-use super::digits::slope;
+use super::digits::{self, slope};
 use super::ports::{CausalityPreferences, Net, Offer, Solved, Way};
 use crate::algebra::{Eliminator, Exprs, NumericPoint};
 use crate::bond_graph::{BondGraph, ElementId, PortCausality};
@@ -17,7 +17,7 @@ const ASKED_FOR: f64 = 1e-6;
 
 /// Solves the junction structure of one connected part as [`solve_part`](super::ports::solve_part) does, with storages
 /// and laws chosen by size at a point. `None` if no choice by size is complete.
-pub(super) fn solve_part_by_size(
+fn solve_part_by_size(
     x: &mut Exprs,
     graph: &BondGraph,
     members: &[ElementId],
@@ -27,6 +27,19 @@ pub(super) fn solve_part_by_size(
     let net = Net::new(x, graph, members, preferences);
     let outputs = x.tried(|x| chosen(x, graph, &net, preferences, point));
     express(x, &net, outputs, preferences, point)
+}
+
+/// The same, if it tells as much as a solution that is there and amplifies rounding errors less than that one does.
+pub(super) fn better_by_size(
+    x: &mut Exprs,
+    graph: &BondGraph,
+    members: &[ElementId],
+    preferences: &CausalityPreferences,
+    point: &mut NumericPoint,
+    (solved, cost): (&Solved, f64),
+) -> Option<Solved> {
+    let found = solve_part_by_size(x, graph, members, preferences, point)?;
+    (found.tells_as_much_as(solved) && digits::cost(x, graph, &found, point) < cost).then_some(found)
 }
 
 /// The roles of the ports, inputs and outputs chosen by size.

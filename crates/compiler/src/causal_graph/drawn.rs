@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::assign::{preferred, sequential};
-use super::by_size::solve_part_by_size;
+use super::by_size::better_by_size;
 use super::digits;
 use super::ports::{CausalityPreferences, Solved, Virtual, imposes_effort, solve_part_at_length};
 use super::rules::{around, in_order, kept_in, kept_junctions, sits_at};
@@ -27,7 +27,8 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
     let drawn = |port: PortRef| sits_at(graph, strokes, port);
     let mut kept = BTreeSet::new();
     let speeds = kept_in(causal, strokes);
-    let mut start = start_point(&x, graph);
+    // Looked for only where something is divided by.
+    let mut start: Option<NumericPoint> = None;
     for members in parts(graph) {
         let assumed = x.assumed();
         let drawn_here =
@@ -35,7 +36,8 @@ pub fn as_drawn(causal: &CausalGraph, strokes: &Table<BondId, Stroke>) -> Causal
         let own = |v: &&Virtual| speeds.contains(&v.junction) && members.binary_search(&v.junction).is_ok();
         let own: Vec<Virtual> = causal.ports.virtual_speeds.iter().filter(own).copied().collect();
         let local = drawn_here.then(|| local::definitions(&mut x, graph, &members, &drawn, &own));
-        match local.filter(|(_, divisors)| !divisors.iter().any(|&d| digits::vanishes(&x, d, &mut start))) {
+        let mut vanishes = |d| digits::vanishes(&x, d, start.get_or_insert_with(|| start_point(&x, graph)));
+        match local.filter(|(_, divisors)| !divisors.iter().any(|&d| vanishes(d))) {
             Some((definitions, divisors)) => {
                 ports.ports.extend(local::roles(graph, &members, &drawn));
                 ports.virtual_speeds.extend(own);
@@ -142,10 +144,7 @@ fn solve_open(
     }
     let with_solved = x.assumed();
     x.suppose(before);
-    let by_size = solve_part_by_size(x, graph, members, preferences, start);
-    let by_size =
-        by_size.filter(|found| found.tells_as_much_as(&solved) && digits::cost(x, graph, found, start) < cost);
-    by_size.unwrap_or_else(|| {
+    better_by_size(x, graph, members, preferences, start, (&solved, cost)).unwrap_or_else(|| {
         x.suppose(with_solved);
         solved
     })

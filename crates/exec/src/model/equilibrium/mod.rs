@@ -176,12 +176,15 @@ impl Model {
         if other.rests_at(&mut jacobian, leaf.as_ref(), t, &y) {
             return Ok(found);
         }
+        let rates = other.dx.iter().copied().enumerate();
+        let fastest = rates.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let moving = fastest.map(|(i, rate)| (other.state_name(i), rate)).into_iter().collect();
         let there = other.search_equilibrium(t, &y)?;
         let values = other.values_of_all(t, &there.x).map_err(EquilibriumError::Failure)?;
         let mut x = there.x.clone();
         match other.go_over(self.run.mode, t, &mut x, &values).map_err(EquilibriumError::Failure)? {
             true => *self = other,
-            false => return Err(EquilibriumError::None(Vec::new())),
+            false => return Err(EquilibriumError::None(moving)),
         }
         Ok(Equilibrium { x, ..there })
     }
