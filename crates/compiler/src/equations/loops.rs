@@ -26,8 +26,6 @@ const COMPARED: f64 = 1e-8;
 /// Defines the variables of a loop by gains, if it is torn at several, and if their equations are regular at the start:
 /// a formula may be so where the equations that it comes from are not.
 pub fn by_gains(d: &mut Definitions, own: &[(Symbol, Combination)], rows: &mut Rows, point: &mut NumericPoint) {
-    // What is written out since terms cancel in it stays so: in numbers rounding would be left.
-    let own: Vec<&(Symbol, Combination)> = own.iter().filter(|r| !rows.cancels(r.0)).collect();
     let members: BTreeSet<Symbol> = own.iter().map(|r| r.0).collect();
     let written: BTreeMap<Symbol, Definition> = own.iter().map(|(s, _)| (*s, d.of[s])).collect();
     let mut around: BTreeSet<Symbol> = BTreeSet::new();
@@ -37,7 +35,13 @@ pub fn by_gains(d: &mut Definitions, own: &[(Symbol, Combination)], rows: &mut R
         d.of.insert(*symbol, definition);
     }
     let symbols: Vec<Symbol> = members.iter().copied().collect();
-    let torn = tear(d, &symbols, &BTreeSet::new());
+    // Where terms cancel in a variable the loop is torn: what it depends on is known from its formula, in numbers rounding would
+    // be left. Its row stays, since the others need not have a solution wherever all have one.
+    let cancelling: BTreeSet<Symbol> = symbols.iter().copied().filter(|&s| rows.cancels(s)).collect();
+    let mut torn = tear(d, &symbols, &cancelling);
+    torn.extend(cancelling);
+    torn.sort_unstable();
+    torn.dedup();
     let gains = match torn.len() >= FEWEST {
         true => Beside::of(d, &torn, around.into_iter().collect(), rows).and_then(|beside| {
             let body: Vec<Symbol> = symbols.iter().copied().filter(|s| !torn.contains(s)).collect();
