@@ -169,8 +169,9 @@ impl Model {
     ///
     /// The equilibrium is sought along directions that the junction structure allows: a displacement that depends on others,
     /// moved alone, would change no rate by more than rounding error. Neither would a state that acts on a rate by rounding
-    /// alone: a rate that no state brings to 0 has no equilibrium. Nor does the way to it count further than equations are
-    /// about as they are here: a diode that hardly conducts at the start would have its capacitor charged to a million volts.
+    /// alone: a rate that no state brings to 0 has no equilibrium. Nor does the way to it count further than states may get, as
+    /// those of a machine that falls, or than equations are about as they are here: a diode that hardly conducts at the start
+    /// would have its capacitor charged to a million volts.
     pub(super) fn magnitudes(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = x.len();
         let mut sizes: Vec<f64> = x.iter().map(|x| x.abs()).collect();
@@ -186,6 +187,7 @@ impl Model {
             return sizes;
         };
         let mut step = directions.step(&way.step);
+        step.iter_mut().zip(&reaches).for_each(|(step, reach)| *step = step.min(FAR * reach).max(-FAR * reach));
         let pulls: Vec<f64> =
             (0..n).map(|i| (0..n).map(|j| (jacobian[i * n + j] * step[j]).abs()).sum::<f64>()).collect();
         let mut fastest = fastest;
