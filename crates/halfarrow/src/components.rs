@@ -3,6 +3,7 @@
 use halfarrow_compiler::ast::{self, Declaration, StatementKind};
 use halfarrow_compiler::bond_graph::{FileError, Files};
 use halfarrow_compiler::span::FileId;
+use halfarrow_compiler::unit::Unit;
 use serde::Serialize;
 
 use crate::error::Problem;
@@ -175,10 +176,11 @@ impl Component {
         ]
     }
 
-    /// How it is written with what it needs: `Resistor:name(r = …)`.
+    /// How it is written with what it needs: `Resistor:name(r = …)`. Bundles, such as frames, come along bonds.
     pub fn usage(&self) -> String {
         let all = self.parameters.iter().chain(&self.constants).chain(&self.inputs);
-        let needed = all.filter(|e| e.default.is_none());
+        let is_bundle = |e: &Entry| e.unit.as_ref().is_some_and(|unit| Unit::parse(unit).is_err());
+        let needed = all.filter(|e| e.default.is_none() && !is_bundle(e));
         let needed: Vec<String> = needed.map(|e| format!("{} = …", e.name)).collect();
         match needed.is_empty() {
             true => format!("{}:name", self.name),

@@ -191,6 +191,7 @@ impl Model {
         let notes = projected(system.program(), run.project, Method::Fixed(run.method))?;
         cost::held(&system, TICKS / run.rate)?;
         let mut x = self.start(&mut system, run.start)?;
+        system.begin_at_positions(0.0, &mut x);
         system.bound_iterations(run.bound.unwrap_or(MOST_EVALUATIONS));
         let modes = self.prepared_modes(&system);
         let audit = self.rehearse(&system, run, &x)?;

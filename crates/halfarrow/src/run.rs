@@ -464,14 +464,18 @@ impl Model {
         let mut audited = Audited::new(system, &self.graph);
         execute(audited.model(), execution, options)?;
         let mut outcome = match taped {
-            None => audited.simulate(options, &mut x, &mut sink),
+            None => {
+                audited.model().begin_at_positions(0.0, &mut x);
+                audited.simulate(options, &mut x, &mut sink)
+            }
             Some(taped) => audited.simulate_taped(options, &mut x, &mut sink).map(|(summary, tape, first)| {
                 *taped = Some(Taped { tape, first, stiff: is_stiff(options, &summary) });
                 summary
             }),
         };
         if let Err(stopped) = &mut outcome {
-            stopped.failure = audited.explain(stopped);
+            let ended = audited.model().end_of_derivatives(stopped.time);
+            stopped.failure = ended.unwrap_or_else(|| audited.explain(stopped));
         }
         // Those of the mode in which it ends.
         let names = audited.model().program().own_states().iter().map(|state| state.name.clone()).collect();
@@ -718,8 +722,14 @@ impl Model {
 
     /// The values of the unknowns of a form at the start; none where there is no start.
     pub(crate) fn unknowns_at_start(&self, equations: &Equations) -> Vec<f64> {
-        let found = self.implicit_system(equations, &Run::default()).map(|mut system| system.initialise(0.0));
-        found.ok().and_then(Result::ok).map(|(y, _)| y).unwrap_or_default()
+        let found = match self.runs_alone(equations.form) {
+            true => self.system(equations).and_then(|mut system| self.start(&mut system, Start::Given)).ok(),
+            false => {
+                let system = self.implicit_system(equations, &Run::default());
+                system.ok().and_then(|mut system| system.initialise(0.0).ok()).map(|(y, _)| y)
+            }
+        };
+        found.unwrap_or_default()
     }
 
     /// The values of all variables at the start; none where there is no start.

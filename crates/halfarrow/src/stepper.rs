@@ -124,6 +124,7 @@ impl Compiled {
         projected(system.program(), project, Method::Fixed(method))?;
         system.tell_drift(true);
         let mut run = Stepwise::new(method, 0.0, &system).projecting(project);
+        system.begin_at_positions(0.0, &mut x);
         run.start(&mut system, &mut x).map_err(|stopped| self.model().stopped_at(stopped))?;
         let inputs = vec![None; system.program().inputs.len()];
         let states = self.minimal().program().states.iter().map(|state| state.name.clone()).collect();

@@ -525,7 +525,9 @@ fn prepare(
     start: crate::run::Start,
 ) -> Result<Vec<f64>, String> {
     set_all(system, plan, set)?;
-    model.start(system, start).map_err(|error| error.to_string())
+    let mut x = model.start(system, start).map_err(|error| error.to_string())?;
+    system.begin_at_positions(0.0, &mut x);
+    Ok(x)
 }
 
 /// Names and units of the columns.

@@ -128,6 +128,73 @@ fn two_bodies_that_turn_together_start_aligned() {
     assert!(last(&done, "rocker.angle") > 1.0, "it falls");
 }
 
+/// Frames that turn together meet on the side on which they are alike, not turned by half a turn, however far apart they begin; and
+/// states follow from where the start is, which may be far from where it is looked for.
+#[test]
+fn frames_that_turn_together_are_alike() {
+    let slide = "model Slide\nimport std.multibody\nWorld:world -> FixedRotation:lean(n = [0, 1, 0], angle = 0.5) -> 1[frame]:base\n\
+                 base -> Prismatic:x(n = [1, 0, 0], v0 = 3) -> Prismatic:y(n = [0, 1, 0]) -> Prismatic:z -> Spherical:turning(e0 = [0.1, 1, 0, 0]) -> 1[frame]:loose\n\
+                 loose -> Body:b(m = 2, J = diag([0.2, 0.2, 0.2]), c = [0.3, 0.1, -0.2])\n\
+                 CutPrismatic:cut(n = [1, 0, 0])\nbase -> cut.a\nloose -> cut.b\n";
+    let done = run(slide, &Run { to: 1.0, ..Run::default() });
+    for turned in 2..=4 {
+        close(last(&done, &format!("turning.e[{turned}]")), 0.0, 1e-12);
+    }
+    close(last(&done, "x.way"), 3.0 + 9.81 / 2.0 * 0.5f64.sin(), 1e-6);
+    // A hinge whose axis points the other way at first.
+    let hinge = "model Hinge\nimport std.multibody\nWorld:world(g = [0, -9.81, 0]) -> 1[frame]:base\n\
+                 base -> Free:way(e0 = [0.1, 1, 0.1, 0]) -> 1[frame]:loose -> Body:b(m = 2, J = diag([0.2, 0.2, 0.2]), c = [0.3, 0, 0])\n\
+                 CutRevolute:pin(n = [0, 0, 1])\nbase -> pin.a\nloose -> pin.b\n";
+    let done = run(hinge, &Run { to: 0.5, ..Run::default() });
+    let e: Vec<f64> = (1..=4).map(|k| last(&done, &format!("way.turning.e[{k}]"))).collect();
+    let square: f64 = e.iter().map(|e| e * e).sum();
+    close((e[0] * e[0] + e[3] * e[3]) / square, 1.0, 1e-9);
+    // One that is carried by a pendulum beside one that falls: 169 degrees apart.
+    let text = "model Falling\nimport std.multibody\nWorld:world(g = [-10, -8, -8]) -> 1[frame]:ground\n\
+                ground -> Free:one(x0 = [0.6, -0.2, 0.6]) -> 1[frame]:a -> Body:b1(m = 1.1, J = diag([0.11, 0.06, 0.12]), c = [0.3, -0.2, 0.1])\n\
+                ground -> Spherical:ball(e0 = [0.03, 0.6, 2.5, 0.8]) -> 1[frame]:b -> Body:b2(m = 3, J = diag([0.3, 0.2, 0.5]), c = [-0.3, 0.1, 0.05])\n\
+                b -> Free:two(x0 = [0.5, -0.4, 0.1], e0 = [0.9, 1.7, -0.1, -0.3]) -> 1[frame]:c -> Body:b4(m = 0.5, J = diag([0.05, 0.04, 0.05]), c = [0, -0.2, 0.4])\n\
+                CutOrientation:alike\na -> alike.a\nc -> alike.b\nb -> FrameSensor:sensor\n";
+    let alone = "model Pendulum\nimport std.multibody\nWorld:world(g = [-10, -8, -8]) -> 1[frame]:ground\n\
+                 ground -> Spherical:ball(e0 = [0.03, 0.6, 2.5, 0.8]) -> 1[frame]:b -> Body:b2(m = 3, J = diag([0.3, 0.2, 0.5]), c = [-0.3, 0.1, 0.05])\n\
+                 b -> FrameSensor:sensor\n";
+    let exact = Run { to: 1.0, every: Some(1.0), rtol: 1e-10, ..Run::default() };
+    let [together, alone] = [text, alone].map(|text| run(text, &exact));
+    for k in 1..=4 {
+        assert!(column(&together, "one.turning.e[1]")[0] == 1.0);
+        close(column(&together, &format!("ball.e[{k}]"))[0], column(&alone, &format!("ball.e[{k}]"))[0], 1e-14);
+    }
+    for way in 1..=3 {
+        let w = format!("sensor.w[{way}]");
+        close(last(&together, &w), last(&alone, &w), 1e-8);
+    }
+}
+
+/// A body that hangs on a ball joint, drawn as one that moves freely and a cut joint, goes on where one of its speeds tells another
+/// by equations of their own that vanish, as long as the three that are independent tell all of them.
+#[test]
+fn a_free_body_hangs_on_a_ball_joint() {
+    let body = "1[frame]:b -> Body:bob(m = 2 kg, J = diag([0.2, 0.15, 0.1]), c = [0.2, -0.3, -0.1])";
+    let text = format!(
+        "model Hung\nimport std.multibody\nWorld:world -> 1[frame]:ground\n\
+         ground -> Free:way(x0 = [0, 0, -1], e0 = [-1, -0.4, -0.5, 0.04]) -> {body}\n\
+         b -> FixedTranslation:eye(d = [1, 0.5, 0.3]) -> pin.b\nground -> pin.a\nCutSpherical:pin\nb -> FrameSensor:sensor\n"
+    );
+    let exact = Run { to: 3.0, every: Some(0.5), rtol: 1e-9, ..Run::default() };
+    let done = run(&text, &exact);
+    let e: Vec<String> = (1..=4).map(|k| format!("{:e}", column(&done, &format!("way.turning.e[{k}]"))[0])).collect();
+    let tree = format!(
+        "model Tree\nimport std.multibody\nWorld:world -> Spherical:ball(e0 = [{}]) -> FixedTranslation:arm(d = [-1, -0.5, -0.3]) -> {body}\n\
+         b -> FrameSensor:sensor\n",
+        e.join(", ")
+    );
+    let tree = run(&tree, &exact);
+    for name in (1..=3).flat_map(|k| [format!("sensor.w[{k}]"), format!("sensor.r[{k}]")]) {
+        let most = column(&tree, &name).iter().fold(0.0f64, |most, v| most.max(v.abs()));
+        column(&done, &name).iter().zip(column(&tree, &name)).for_each(|(a, b)| close(*a, *b, 1e-6 * most));
+    }
+}
+
 /// A pendulum that falls from level, by x, y and an angle of which a pin leaves one: now this, now that one is independent, and so
 /// are their rates. Closed form: Jacobi's functions with a half as their parameter.
 #[test]

@@ -322,3 +322,20 @@ when y > 1 { reset m.f = 0.5*m.f }
     let stuck = refusal(pad, &run(&["v"], 2.0));
     assert!(stuck.contains("pad") && stuck.contains("another branch"), "{stuck}");
 }
+
+/// Derivatives are not taken over into other independent variables: where a run needs these they are named as the reason, not the
+/// length of its steps.
+#[test]
+fn other_independent_variables_are_the_reason() {
+    let text = "model FourBar\nimport std.multibody\nparam m = 1 kg\nWorld:world -> 1[frame]:ground\nCutInline:joint(n = [0, 1, 0])\n\
+                ground -> Revolute:crank(n = [0, 1, 0], q0 = -1 rad, w0 = 5 rad/s) -> 1[frame]:a\n\
+                a -> Body:bar(m = m, J = diag([1e-3, 4e-3, 4e-3]), c = [0.1, 0, 0])\n\
+                a -> FixedTranslation:pin(d = [0.2, 0, 0]) -> Revolute:knee(n = [0, 1, 0], q0 = 0.5 rad) -> 1[frame]:b\n\
+                b -> Body:coupler(m = 2 kg, J = diag([1e-3, 0.04, 0.04]), c = [0.15, 0, 0])\n\
+                b -> FixedTranslation:tip(d = [0.3, 0, 0]) -> joint.a\n\
+                ground -> FixedTranslation:base(d = [0.6, 0, 0]) -> Revolute:rocker(n = [0, 1, 0], q0 = -1.5 rad) -> 1[frame]:c\n\
+                c -> Body:swing(m = 1.5 kg, J = diag([1e-3, 0.02, 0.02]), c = [0.2, 0, 0])\nc -> FixedTranslation:top(d = [0.4, 0, 0]) -> joint.b\n";
+    model(text).simulate(&run(&[], 1.0), &mut |_| true).unwrap_or_else(|error| panic!("{error}"));
+    let why = refusal(text, &run(&["m"], 1.0));
+    assert!(why.contains("the motion has no derivative") && why.contains("other independent variables"), "{why}");
+}

@@ -27,6 +27,11 @@ const SMALLER: f64 = 0.95;
 /// Which positions follow from others is decided anew where the determinant of their equations has come to a tenth, as a
 /// logarithm.
 const TURNING: f64 = std::f64::consts::LN_10;
+/// So is it at a start where one of them moves so many times as far as what it follows from: as if a quaternion followed from one of
+/// its numbers that is 0 there.
+const LOST: f64 = 1e3;
+/// and where it is further than this from where the start has it.
+const COMPARED: f64 = 1e-6;
 const ITERATIONS: usize = 20;
 
 /// The ratios between variables that could be independent and those that are.
@@ -74,10 +79,14 @@ impl Model {
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
     /// position and motion in the new ones. `failed`: a step from here has failed.
     pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+        if self.variation.is_some() {
+            self.outlive(t, x, failed);
+            return Ok(false);
+        }
         if self.exchange_speeds(t, x, failed)? {
             return Ok(true);
         }
-        Ok(self.positions_turn() && self.exchange_positions(t, x)?)
+        Ok((self.positions_turn() || failed) && self.exchange_positions(t, x)?)
     }
 
     /// Whether the equations of computed positions have come near to being singular, as where a position turns round that
@@ -102,6 +111,48 @@ impl Model {
         turn
     }
 
+    /// Begins a run at the start `(t, x)` in states that tell it: which positions follow from others is decided before the start is
+    /// known, at an estimate of it.
+    pub fn begin_at_positions(&mut self, t: f64, x: &mut [f64]) {
+        if !self.may_change_mode() || self.run.positions.is_empty() || self.variation.is_some() {
+            return;
+        }
+        let code = self.code.clone();
+        let states = code.program.tracked.iter().copied().zip(x.iter().copied());
+        let positions = code.program.positions.iter().map(|position| position.symbol);
+        let there: BTreeMap<Symbol, f64> = states.chain(positions.zip(self.run.positions.iter().copied())).collect();
+        let (start, at) = (self.clone(), x.to_vec());
+        let lost = self.are_positions_lost(t, x);
+        *self = start.clone();
+        let independent = code.exchanges.iter().flat_map(|ratios| ratios.independent.iter().map(|e| e.symbol));
+        let mode = if lost { self.compiled.decided_at(&there, &code, independent.collect()) } else { None };
+        let entered =
+            mode.is_some_and(|mode| matches!(self.enter_at(mode, t, x, &there, start.recorded.chosen.len()), Ok(true)));
+        if mode.is_some() && !entered {
+            *self = start;
+            x.copy_from_slice(&at);
+        }
+    }
+
+    /// Whether a computed position is not where the start has it, or moves far more than a state that it follows from.
+    fn are_positions_lost(&mut self, t: f64, x: &[f64]) -> bool {
+        let code = self.code.clone();
+        let positions: Vec<Value> = code.program.positions.iter().map(|position| position.value).collect();
+        let routine = self.routine_for(&positions);
+        let start = self.run.positions.clone();
+        (0..x.len()).any(|state| {
+            self.place(t, x);
+            self.still();
+            self.frame.d[code.layout.states as usize + state] = 1.0;
+            let moved = self.frame.run_along(&routine);
+            let lost = |(&r, start): (&u32, &f64)| {
+                let (value, slope) = (self.frame.r[r as usize], self.frame.d[r as usize]);
+                (value - start).abs() > COMPARED * start.abs().max(1.0) || slope.abs() > LOST
+            };
+            moved.is_err() || routine.outputs.iter().zip(&start).any(lost)
+        })
+    }
+
     /// Where positions that follow from others turn round, as the fourth number of a quaternion does, others have to follow:
     /// which ones do is decided anew at `(t, x)`.
     fn exchange_positions(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {
@@ -121,19 +172,27 @@ impl Model {
         Ok(exchanged)
     }
 
+    /// Derivatives are not taken over into other variables: they go on as far as the present ones do.
+    fn outlive(&mut self, t: f64, x: &[f64], failed: bool) {
+        let code = self.code.clone();
+        let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else { return };
+        let most = if failed { AFTER_FAILURE } else { FAR };
+        if !self.is_due(ratios, t, x, failed) {
+            return;
+        }
+        let outlived = self.is_suspicious(ratios, t, x, most) && self.better(ratios, t, x, most).is_some();
+        if let Some(variation) = &mut self.variation {
+            variation.outlived = outlived;
+        }
+    }
+
     fn exchange_speeds(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
         let code = self.code.clone();
         let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else {
             return Ok(false);
         };
         let most = if failed { AFTER_FAILURE } else { FAR };
-        let smaller = self.is_pivot_smaller(ratios, t, x);
-        if !failed && !smaller {
-            return Ok(false);
-        }
-        self.run.pivots.clear();
-        self.run.pivots.extend(ratios.pivots.outputs.iter().map(|&r| self.frame.r[r as usize]));
-        if !self.is_suspicious(ratios, t, x, most) {
+        if !self.is_due(ratios, t, x, failed) || !self.is_suspicious(ratios, t, x, most) {
             return Ok(false);
         }
         let Some(wanted) = self.better(ratios, t, x, most) else {
@@ -174,6 +233,16 @@ impl Model {
         self.still();
         self.frame.d[register as usize] = 1.0;
         self.frame.run_along(&ratios.routine).is_ok()
+    }
+
+    /// Whether ratios are to be looked at: since what they are divided by is smaller, or a step has failed.
+    fn is_due(&mut self, ratios: &Ratios, t: f64, x: &[f64], failed: bool) -> bool {
+        if !self.is_pivot_smaller(ratios, t, x) && !failed {
+            return false;
+        }
+        self.run.pivots.clear();
+        self.run.pivots.extend(ratios.pivots.outputs.iter().map(|&r| self.frame.r[r as usize]));
+        true
     }
 
     /// Whether something that ratios are divided by is smaller than when they were last looked at, or has changed its

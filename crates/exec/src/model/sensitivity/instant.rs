@@ -92,7 +92,10 @@ impl Model {
         let mut laws: Vec<&str> = ended.map(|law| self.code.program.set_valued[law as usize].name.as_str()).collect();
         laws.dedup();
         let (what, reason) = match laws.is_empty() {
-            true => ("the motion".to_string(), "it goes on in another mode, and derivatives are not taken over"),
+            true => (
+                "the motion".to_string(),
+                "it goes on in other independent variables or branches, and derivatives are not taken over",
+            ),
             false => {
                 (laws.join(", "), "another branch holds from there on, and derivatives are not taken over into it")
             }

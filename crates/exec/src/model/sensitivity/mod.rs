@@ -54,6 +54,8 @@ pub(super) struct Variation {
     sums: Vec<Vec<f64>>,
     stored: Vec<Vec<f64>>,
     values: Vec<Vec<f64>>,
+    /// Whether other variables should be independent by now, to which derivatives are not taken over.
+    pub(super) outlived: bool,
 }
 
 impl Model {
@@ -82,6 +84,7 @@ impl Model {
             sums: rows(0),
             stored: rows(program.jumps.as_ref().map_or(0, |j| j.stored.len())),
             values: rows(self.events.values.len()),
+            outlived: false,
         });
         for (j, quantity) in by.iter().enumerate() {
             let fixed = self.vary_fixed(*quantity, &names[j])?;
@@ -183,11 +186,18 @@ impl Model {
         run.map(|()| slopes).map_err(|error| self.failure(t, error))
     }
 
+    /// Why a run that is followed by derivatives has stopped at `time`, if it needed other independent variables by then: these are
+    /// not taken over into them.
+    pub fn end_of_derivatives(&self, time: f64) -> Option<Failure> {
+        let outlived = self.variation.as_ref().is_some_and(|variation| variation.outlived);
+        outlived.then(|| Model::in_other_variables(time))
+    }
+
     /// That there is no derivative where other variables become independent.
     fn in_other_variables(time: f64) -> Failure {
         let reason =
             "the run goes on with other independent variables there, and derivatives are not taken over into these";
-        Model::without_derivative(time, "the states", reason)
+        Model::without_derivative(time, "the motion", reason)
     }
 
     /// That there is no derivative.

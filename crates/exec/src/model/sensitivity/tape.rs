@@ -190,6 +190,7 @@ impl<'m> Taped<'m> {
             sums: rows(0),
             stored: rows(own.stored.first().map_or(0, Vec::len)),
             values: rows(own.values.first().map_or(0, Vec::len)),
+            outlived: false,
         };
         let still = own.fixed.first().map_or(0, Vec::len);
         for (row, &direction) in directions.iter().enumerate() {
