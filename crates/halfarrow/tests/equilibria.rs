@@ -240,3 +240,26 @@ fn what_falls_does_not_rest_far_away() {
         assert!(error.contains("no equilibrium was found"), "{error}");
     }
 }
+
+/// A pendulum hangs where it swings to, not where it would be after turns: a step of Newton's method from near the place where its
+/// slope vanishes leads far away.
+#[test]
+fn a_pendulum_hangs_where_it_swings_to() {
+    for (begin, rest) in [(0.1, 0.5), (0.3, 0.5), (1.2, 0.5), (2.5, 0.5), (-1.0, -0.5)] {
+        let text = format!(
+            "model Pendulum\nimport std.multibody\n\
+             World:world -> Revolute:r(n = [0, 1, 0], q0 = {begin}) -> Body:b(m = 1, J = diag([1, 1, 1]), c = [1, 0, 0])\n"
+        );
+        let found = run_at_rest(&text).unwrap_or_else(|e| panic!("{}", e.render(false)))["r.q"];
+        assert!((found - rest * std::f64::consts::PI).abs() < 1e-9, "{begin}: {found}");
+    }
+}
+
+/// A machine that falls, with a slide on it, has no rest: the search ends, and says what moves.
+#[test]
+fn a_search_for_rest_ends_where_there_is_none() {
+    let text = "model Falling\nimport std.multibody\nWorld:world -> Free:j1(w0 = [1.37, 0.40, 1.67]) -> 1[frame]:f1\n\
+                f1 -> Body:b1(m = 1.95 kg, J = diag([0.058, 0.053, 0.051]))\n\
+                f1 -> Prismatic:j3(n = [-0.86, 0.87, 0.89], q0 = 0.23, v0 = -0.48) -> Body:b3(m = 1.11 kg, J = diag([0.090, 0.094, 0.058]))\n";
+    assert!(matches!(run_at_rest(text), Err(Error::Usage(Problem::NoEquilibrium { .. }))));
+}

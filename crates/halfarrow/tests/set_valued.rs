@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use halfarrow::{FixedMethod, Method, Model, Record, Run, Simulated};
+use halfarrow::{FixedMethod, Form, Method, Model, Record, Run, Simulated};
 
 fn model(text: &str) -> Model {
     let model = Model::from_text("machine.bond", &format!("model Machine\n{text}"), &[]);
@@ -475,5 +475,18 @@ fn refusals() {
         ("Se:a(1) -> 1:v -> I:m(1)\nstate x' = v.f\nconstraint c: x >= 0 (bounce = 1)\n", "takes no such value"),
     ] {
         assert!(told(text, 1.0).contains(why), "{}", told(text, 1.0));
+    }
+}
+
+/// Equations are told with the values of their unknowns at the start also where dry friction acts on one of two storages that move
+/// together, in both forms that choose branches themselves.
+#[test]
+fn unknowns_of_friction_have_values_at_the_start() {
+    let model =
+        model("model Geared\n1:a -> I:m(1, f0 = 2)\na -> R:fr(friction = 0.5)\na -> TF:g(2) -> 1:b -> I:n(2)\n");
+    for form in [Form::Minimal, Form::Kane] {
+        let report = model.equations(form).unwrap_or_else(|error| panic!("{error}"));
+        let found: Vec<(&str, Option<f64>)> = report.states.iter().map(|s| (s.name.as_str(), s.initial)).collect();
+        assert_eq!(found, [("m.f", Some(2.0))], "{form:?}");
     }
 }

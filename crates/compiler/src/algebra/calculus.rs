@@ -93,6 +93,24 @@ impl Exprs {
         roots.iter().map(|r| new.get(r).copied().unwrap_or(*r)).collect()
     }
 
+    /// The expression where a condition holds, or does not: with one side of each choice that goes by it.
+    pub fn in_branch(&mut self, e: Expr, condition: Expr, holds: bool) -> Expr {
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in self.below(&[e], &|_| true) {
+            let side = match *self.node(part) {
+                Node::Select(c, a, b) if c == condition => Some(if holds { a } else { b }),
+                _ => None,
+            };
+            let known = |c: Expr| new.get(&c).copied().unwrap_or(c);
+            let made = match side {
+                Some(side) => known(side),
+                None => self.rebuild(part, &known),
+            };
+            new.insert(part, made);
+        }
+        new.get(&e).copied().unwrap_or(e)
+    }
+
     /// The expressions without symbols that they read though their value does not depend on them: the distance of two points
     /// of a body does not depend on where the body is. `may_go` tells which symbols are looked at.
     ///

@@ -179,13 +179,19 @@ impl<'a> Builder<'a, '_> {
         let terms: Vec<(Symbol, Expr)> = terms.filter(|(_, a)| !self.exprs.is_zero(*a)).collect();
         // What holds whatever moves, as the closure of a plane loop across its plane does, carries nothing.
         if terms.is_empty() && !(self.exprs.is_zero(expr) && sides.restitution.is_none()) {
-            let d = Diagnostic::error(
-                codes::L006,
-                "a constraint on nothing that moves",
-                sides.span,
-                "reads no displacement or flow",
-            );
-            self.fault(d.hint("name displacements of elements (`spring.q`), or states whose rate is a flow"));
+            let missed = self.value_of(expr).filter(|missed| *missed != 0.0 && sides.restitution.is_none());
+            let why = missed.map_or("reads no displacement or flow".to_string(), |missed| {
+                format!("its sides are {} apart, whatever moves", missed.abs())
+            });
+            let hint = match missed {
+                Some(_) => {
+                    "name displacements of elements (`spring.q`), or states whose rate is a flow; \
+                     a loop of bodies that move in a plane has to fit across it"
+                }
+                None => "name displacements of elements (`spring.q`), or states whose rate is a flow",
+            };
+            let d = Diagnostic::error(codes::L006, "a constraint on nothing that moves", sides.span, why);
+            self.fault(d.hint(hint));
             return None;
         }
         // Numbers whose sum is 0 are not so in floats.
@@ -193,18 +199,26 @@ impl<'a> Builder<'a, '_> {
         Some(Relation { at: sides.at, expr, holonomic, terms, rest, restitution: sides.restitution, span: sides.span })
     }
 
-    /// Whether an expression of displacements is known to jump while nothing moves: one number up to an instant, and another
-    /// one from there on, with nothing beside it that might jump back.
-    fn jumps_in_time(&mut self, expr: Expr) -> bool {
-        let parts = self.exprs.below(&[expr], &|_| true);
-        let choices = parts.into_iter().filter_map(|part| match *self.exprs.node(part) {
-            Node::Select(condition, a, b) => Some((condition, a, b)),
-            _ => None,
-        });
-        let [(condition, a, b)] = choices.collect::<Vec<_>>()[..] else { return false };
-        let difference = self.exprs.sub(a, b);
-        let numbers = !self.exprs.is_zero(difference) && self.reads_only(difference, false);
-        numbers && self.reads_only(condition, true)
+    /// Whether an expression is known to jump while nothing moves: where a condition on time changes its side, it is another by a
+    /// number. What is another by what varies, as a ramp that begins at an instant, may begin with 0.
+    pub(super) fn jumps_in_time(&mut self, expr: Expr) -> bool {
+        let conditions: BTreeSet<Expr> = self
+            .exprs
+            .below(&[expr], &|_| true)
+            .into_iter()
+            .filter_map(|part| match *self.exprs.node(part) {
+                Node::Select(condition, ..) => Some(condition),
+                _ => None,
+            })
+            .collect();
+        conditions.into_iter().any(|condition| {
+            if !self.reads_only(condition, true) {
+                return false;
+            }
+            let [before, after] = [false, true].map(|holds| self.exprs.in_branch(expr, condition, holds));
+            let difference = self.exprs.sub(after, before);
+            !self.exprs.is_zero(difference) && self.reads_only(difference, false)
+        })
     }
 
     /// Whether an expression reads parameters alone; with `time`, nothing but these and time, which it reads.

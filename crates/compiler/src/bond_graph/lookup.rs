@@ -561,6 +561,15 @@ impl<'a> Builder<'a, '_> {
             );
             return None;
         }
+        if self.jumps_in_time(value.expr) {
+            let fault = Diagnostic::error(codes::L004, "what jumps has no rate", span, "differentiated here");
+            self.fault(
+                fault.hint(
+                    "from one instant to the next it is another: let it change over some time, `min(t/0.1 s, 1)`",
+                ),
+            );
+            return None;
+        }
         let expr = self.rate_of(value.expr, span)?;
         Some(Value::number(expr, value.quantity.over(&Quantity::of(Dim::SECOND))))
     }

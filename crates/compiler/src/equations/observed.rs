@@ -13,11 +13,17 @@ use crate::algebra::{Expr, Symbol, SymbolKind};
 use crate::bond_graph::{BondGraph, HeldKind, Kind, Meaning, Shape};
 use crate::unit::Unit;
 
-/// The name of a state: its variable, or the output or `let` that says the same.
+/// The name of a state: its variable, or the output or `let` that says the same. A sum of stored quantities that has the name of
+/// another one, of the independent variables with which a run began, has one of its own.
 pub fn state_name(d: &Definitions, symbol: Symbol, meaning: Option<Expr>) -> String {
-    let same = meaning.and_then(|m| d.graph.outputs.iter().chain(&d.graph.lets).find(|n| n.value == m));
     let own = d.x.name(symbol);
-    same.map_or_else(|| own.to_string(), |n| n.name.clone())
+    let Some(meaning) = meaning else { return own.to_string() };
+    let mut named = d.graph.outputs.iter().chain(&d.graph.lets);
+    match named.clone().find(|n| n.value == meaning) {
+        Some(same) => same.name.clone(),
+        None if named.any(|n| n.name == own) => format!("{own}.anew"),
+        None => own.to_string(),
+    }
 }
 
 /// Every variable that can be recorded, states, computed positions and outputs first.

@@ -24,6 +24,11 @@ const ITERATIONS: usize = 200;
 const ROUNDS: usize = 50;
 /// Up to so many states equations are full.
 const FEW_STATES: usize = 50;
+/// A step of Newton's method that leaves more than this part of the rates, so many times in a row, is given up.
+const NEARER: f64 = 0.99;
+const SLOW: usize = 10;
+/// How many places of a step are looked at for whether the motion turns round on its way.
+const ON_THE_WAY: u32 = 8;
 /// Steps by which the motion is followed away from where laws are flat, as powers of ten in s, and how many of each.
 const TIMES_AWAY: std::ops::RangeInclusive<i32> = -6..=6;
 const STEPS_AWAY: usize = 3;
@@ -262,7 +267,9 @@ impl Model {
         x: &[f64],
     ) -> Option<Equilibrium> {
         let at = self.point(jacobian, within, t, x.to_vec()).ok()?;
-        if x.len() > FEW_STATES || !(self.code.program.steep || at.has_flat_state()) {
+        // What is flat along a leaf is where a body is, which leads nowhere else.
+        let flat = within.0.is_none() && at.has_flat_state();
+        if x.len() > FEW_STATES || !(self.code.program.steep || flat) {
             return None;
         }
         for decade in TIMES_AWAY {
@@ -319,6 +326,7 @@ impl Model {
         // Where steps as the motion goes have ended.
         let mut stuck: Option<LinearisedPoint> = None;
         let mut at = self.point(jacobian, (leaf, inert), t, x.to_vec()).map_err(EquilibriumError::Failure)?;
+        let mut slow = 0;
         for iteration in 0..ITERATIONS {
             rest.see(&at);
             let Some(newton) = at.newton_step(stuck.is_none()) else { break };
@@ -355,13 +363,21 @@ impl Model {
                     let known = self.rates_at(t, trial).is_ok();
                     known && (norm(&self.dx) < before || !pseudo_step.is_infinite())
                 });
+                let nearer = nearer.filter(|_| {
+                    !pseudo_step.is_infinite() || !self.turns_round(leaf, t, (&at.x, &part), (&at.rates, &weights))
+                });
                 match nearer.and_then(|trial| self.point(jacobian, (leaf, inert), t, trial).ok()) {
                     Some(next) => break Some(next),
                     _ if damping < least_damping => break None,
                     _ => damping *= 0.5,
                 }
             };
-            match moved {
+            // Steps that come no nearer, one after the other, lead nowhere.
+            slow = match &moved {
+                Some(next) if pseudo_step.is_infinite() && norm(&next.rates) > NEARER * before => slow + 1,
+                _ => 0,
+            };
+            match moved.filter(|_| slow <= SLOW) {
                 Some(next) => {
                     let gain = (before / norm(&next.rates).max(f64::MIN_POSITIVE)).clamp(0.3, 10.0);
                     pseudo_step *= gain;
@@ -388,6 +404,27 @@ impl Model {
         let moving = least.map(|least| least.moving).filter(|moving| !moving.is_empty());
         let moving = moving.unwrap_or_else(|| rest.moving(&at.rates));
         Err(EquilibriumError::None(moving.into_iter().map(|(i, rate)| (self.state_name(i), rate)).collect()))
+    }
+
+    /// Whether on a straight way the motion turns round, half as fast as where it begins: then the way leads past a place of rest,
+    /// as several turns of a pendulum do, though where it ends things may be at rest, too.
+    fn turns_round(
+        &mut self,
+        leaf: Option<&Leaf>,
+        t: f64,
+        (from, way): (&[f64], &[f64]),
+        (rates, weights): (&[f64], &[f64]),
+    ) -> bool {
+        let along =
+            |r: &[f64]| r.iter().zip(rates).zip(weights).map(|((r, first), w)| r * w * (first * w)).sum::<f64>();
+        // Along a leaf each place takes a way of its own.
+        let places = if leaf.is_some() { 2 } else { ON_THE_WAY };
+        let first = along(rates);
+        (1..=places).any(|k| {
+            let part: Vec<f64> = way.iter().map(|way| way * f64::from(k) / f64::from(places)).collect();
+            let Some(there) = self.moved(leaf, t, from, &part) else { return false };
+            self.rates_at(t, &there).is_ok() && along(&self.dx) < -0.5 * first
+        })
     }
 
     /// Whether what rounding makes of a place moves as much as where the search began: then it is one of rest by chance, as where
