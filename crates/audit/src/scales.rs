@@ -28,8 +28,10 @@ const LOST: f64 = 1e-6;
 /// What has a magnitude of its own, above rounding of what laws tell, counts as no more times it.
 const AMPLIFIED: f64 = 1e3;
 
-/// From law to law, what stands beside a quantity is passed on so often.
+/// From law to law, what stands beside a quantity is passed on so often;
 const NEIGHBOURS: usize = 3;
+/// and so often, once, to what is nothing but rounding of it: in a machine that falls freely all joints carry no more.
+const FAR_NEIGHBOURS: usize = 12;
 
 /// No scale is below this: numbers near the end of the range of `f64` have fewer digits.
 const LEAST: f64 = f64::MIN_POSITIVE / f64::EPSILON;
@@ -406,16 +408,33 @@ impl Scales {
             beside.raise(place as usize, weight);
         }
         let alone = beside.clone();
+        let links = || self.links.iter().filter(|link| link.1 != number).map(|l| (l.0 as usize, l.1 as usize, l.2));
         for _ in 0..NEIGHBOURS {
             let near = beside.clone();
-            for &(place, from, weight) in self.links.iter().filter(|link| link.1 != number) {
-                let (place, from) = (place as usize, from as usize);
+            for (place, from, weight) in links() {
                 let told = weight * near[from];
                 let own = alone[place];
                 // What is told itself by far greater things than there are makes nothing rounding.
                 let likely = (weight * alone[from]).max(told / (AMPLIFIED * AMPLIFIED));
                 beside.raise(place, if own > FLOOR * likely { told.min(AMPLIFIED * own) } else { told });
             }
+        }
+        // Once, so that nothing grows around a loop.
+        let mut told_once = vec![false; beside.0.len()];
+        for _ in NEIGHBOURS..FAR_NEIGHBOURS {
+            let near = beside.clone();
+            let mut raised = Vec::new();
+            for (place, from, weight) in links().filter(|link| !told_once[link.0]) {
+                let told = weight * near[from];
+                if near[place] < NOISE * told {
+                    beside.raise(place, told);
+                    raised.push(place);
+                }
+            }
+            if raised.is_empty() {
+                break;
+            }
+            raised.into_iter().for_each(|place| told_once[place] = true);
         }
         self.raise_energies(&alone, &mut beside);
         let size =

@@ -482,8 +482,7 @@ fn refusals() {
 /// together, in both forms that choose branches themselves.
 #[test]
 fn unknowns_of_friction_have_values_at_the_start() {
-    let model =
-        model("model Geared\n1:a -> I:m(1, f0 = 2)\na -> R:fr(friction = 0.5)\na -> TF:g(2) -> 1:b -> I:n(2)\n");
+    let model = model("1:a -> I:m(1, f0 = 2)\na -> R:fr(friction = 0.5)\na -> TF:g(2) -> 1:b -> I:n(2)\n");
     for form in [Form::Minimal, Form::Kane] {
         let report = model.equations(form).unwrap_or_else(|error| panic!("{error}"));
         let found: Vec<(&str, Option<f64>)> = report.states.iter().map(|s| (s.name.as_str(), s.initial)).collect();
