@@ -86,7 +86,7 @@ impl Model {
         if self.exchange_speeds(t, x, failed)? {
             return Ok(true);
         }
-        Ok((self.positions_turn() || failed) && self.exchange_positions(t, x)?)
+        Ok(self.positions_turn() && self.exchange_positions(t, x)?)
     }
 
     /// Whether the equations of computed positions have come near to being singular, as where a position turns round that
