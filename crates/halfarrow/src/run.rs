@@ -474,7 +474,7 @@ impl Model {
             }),
         };
         if let Err(stopped) = &mut outcome {
-            let ended = audited.model().end_of_derivatives(stopped.time);
+            let ended = audited.model().end_of_derivatives(&stopped.failure, stopped.time);
             stopped.failure = ended.unwrap_or_else(|| audited.explain(stopped));
         }
         // Those of the mode in which it ends.

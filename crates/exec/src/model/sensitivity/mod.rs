@@ -186,11 +186,20 @@ impl Model {
         run.map(|()| slopes).map_err(|error| self.failure(t, error))
     }
 
-    /// Why a run that is followed by derivatives has stopped at `time`, if it needed other independent variables by then: these are
-    /// not taken over into them.
-    pub fn end_of_derivatives(&self, time: f64) -> Option<Failure> {
+    /// Why a run that is followed by derivatives could not be followed any further at `time`, if it needed other independent
+    /// variables by then: these are not taken over into them. What else stops a run, its user for one, is the reason itself.
+    pub fn end_of_derivatives(&self, failure: &Failure, time: f64) -> Option<Failure> {
+        let lost = matches!(
+            failure,
+            Failure::Singular { .. }
+                | Failure::NoConvergence { .. }
+                | Failure::Branch { .. }
+                | Failure::OffMotion { .. }
+                | Failure::Bound { .. }
+                | Failure::StepTooSmall { .. }
+        );
         let outlived = self.variation.as_ref().is_some_and(|variation| variation.outlived);
-        outlived.then(|| Model::in_other_variables(time))
+        (lost && outlived).then(|| Model::in_other_variables(time))
     }
 
     /// That there is no derivative where other variables become independent.
