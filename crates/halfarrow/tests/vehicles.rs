@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use halfarrow::{FixedMethod, Method, Model, Override, Record, Run, Simulated, Source, Start};
+use halfarrow::{Column, FixedMethod, Form, Method, Model, Override, Record, Run, Simulated, Source, Start};
 
 const SEDAN: &str = include_str!("vehicles/sedan_tyre.tir");
 
@@ -834,6 +834,43 @@ fn sedan_of(text: &str) -> Model {
     let files: BTreeMap<String, String> = files.into_iter().map(|(path, text)| (path.into(), text.into())).collect();
     let source = Source::text("sedan.bond", text).with_files(files);
     Model::new(source, &[]).unwrap_or_else(|e| panic!("{}", e.render(false)))
+}
+
+/// Strokes lead through moduli that are 0 where the bodies stand straight: every form of a car, of a steered corner of it and of an axle
+/// on four links begins there and goes as the minimal one does.
+#[test]
+fn all_forms_of_a_suspension_begin_where_it_stands_straight() {
+    let corner = "model Straight\nimport std.multibody\nimport \"corner.bond\"\nWorld:world -> 1[frame]:car\n\
+                  Corner:fl(side = 1, w0 = 10)\ncar -> fl.body\ncar -> fl.rack\noutput load = fl.tyre.Fz\n\
+                  output up = fl.wheel.a.r[3], turned = fl.wheel.a.R[1, 2]\n";
+    let bench = ("bench.bond".to_string(), include_str!("../../../examples/suspensions/bench.bond").to_string());
+    let axle = Source::text("axle.bond", include_str!("../../../examples/suspensions/rigid_axle.bond"));
+    let axle =
+        Model::new(axle.with_files(BTreeMap::from([bench])), &[]).unwrap_or_else(|e| panic!("{}", e.render(false)));
+    let sedan = sedan_of(include_str!("../../../examples/sedan/sedan.bond"));
+    let forms = |all: &[Form]| all.to_vec();
+    let cases = [
+        (sedan_of(corner), 0.02, 1e-6, forms(&[Form::Lagrange, Form::Break, Form::Inverted, Form::Relaxed])),
+        (axle, 0.02, 1e-7, forms(&[Form::Lagrange, Form::Inverted])),
+        (sedan, 0.01, 1e-6, forms(&[Form::Lagrange, Form::Break])),
+    ];
+    for (model, to, off, forms) in cases {
+        let run = |form| Run { to, form, rtol: 1e-8, every: Some(to / 4.0), ..Run::default() };
+        let of = |form| model.simulate(&run(form), &mut |_| true);
+        let minimal = of(Form::Minimal).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        for form in forms {
+            let other = of(form).unwrap_or_else(|e| panic!("{} {form}: {}", model.name(), e.render(false)));
+            let shared = |column: &&Column| minimal.trace.columns.iter().any(|own| own.name == column.name);
+            for theirs in other.trace.columns.iter().filter(shared) {
+                let own = column(&minimal, &theirs.name);
+                let most = own.iter().fold(1e-3f64, |most, v| most.max(v.abs()));
+                for (a, b) in own.iter().zip(&theirs.values) {
+                    let name = &theirs.name;
+                    assert!((a - b).abs() <= off * most, "{} {form}: {name} is {b}, not {a}", model.name());
+                }
+            }
+        }
+    }
 }
 
 /// A car of the examples, by explicit steps of a millisecond.

@@ -1,6 +1,6 @@
 //! Linear forms and the inversion of laws.
 
-use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
+use super::exprs::{Exprs, ONE, ZERO};
 use super::node::{Comparison, Expr, Function, Node, Parts, Symbol};
 use super::rational::Rational;
 use super::table::Interpolation;
@@ -321,7 +321,8 @@ impl Exprs {
 
     /// From `(a s + b)/(c s + d) = y`, with `a d - b c` not zero.
     fn invert_fraction(&mut self, e: Expr, y: Expr, s: Symbol) -> Option<Expr> {
-        let denominators = self.denominators(e, s);
+        let divisors = self.divisors_of_terms(e, &|x, base| x.depends_on(base, s));
+        let denominators: Vec<Expr> = divisors.into_iter().filter(|(_, n)| *n == 1).map(|(base, _)| base).collect();
         if denominators.is_empty() {
             return None;
         }
@@ -339,28 +340,41 @@ impl Exprs {
         self.divide(above, below)
     }
 
-    fn denominators(&self, e: Expr, s: Symbol) -> Vec<Expr> {
+    /// `e` times all that its terms are divided by and of which `which` says so, so that `e = 0` can be asked for where that
+    /// vanishes.
+    pub fn without_divisors(&mut self, e: Expr, which: &dyn Fn(&Exprs, Expr) -> bool) -> Expr {
+        let divisors = self.divisors_of_terms(e, which);
+        divisors.into_iter().fold(e, |e, (base, power)| {
+            let divisor = self.powi(base, power);
+            self.multiply_out(e, divisor)
+        })
+    }
+
+    /// What the terms of a sum are divided by and of which `which` says so, each with its highest power.
+    pub fn divisors_of_terms(&self, e: Expr, which: &dyn Fn(&Exprs, Expr) -> bool) -> Vec<(Expr, i64)> {
         let terms = match self.node(e) {
-            Node::Add(terms) => terms.clone(),
-            _ => smallvec![e],
+            Node::Add(terms) => terms.as_slice(),
+            _ => &[e],
         };
-        let mut found = Vec::new();
+        let mut divisors: Vec<(Expr, i64)> = Vec::new();
         for term in terms {
-            let factors = match self.node(term) {
-                Node::Mul(factors) => factors.clone(),
-                _ => smallvec![term],
+            let factors = match self.node(*term) {
+                Node::Mul(factors) => factors.as_slice(),
+                _ => std::slice::from_ref(term),
             };
-            for factor in factors {
-                if let Node::Pow(base, n) = self.node(factor)
-                    && *n == MINUS_ONE
-                    && self.depends_on(*base, s)
-                    && !found.contains(base)
-                {
-                    found.push(*base);
+            for &factor in factors {
+                let Node::Pow(base, n) = *self.node(factor) else { continue };
+                let power = self.is_number(n).and_then(|n| n.as_integer()).map_or(0, |n| -n);
+                if power <= 0 || !which(self, base) {
+                    continue;
+                }
+                match divisors.iter_mut().find(|(known, _)| *known == base) {
+                    Some((_, most)) => *most = (*most).max(power),
+                    None => divisors.push((base, power)),
                 }
             }
         }
-        found
+        divisors
     }
 
     /// `e * factor` term by term, with `factor` cancelled against its inverse: for solving, where the caller checks

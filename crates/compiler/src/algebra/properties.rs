@@ -104,6 +104,11 @@ impl Exprs {
         self.signs(e).within(Signs::NOT_ZERO)
     }
 
+    /// Whether the expression is known never to be zero, without anything being assumed of what it is made of.
+    pub fn is_nonzero_by_itself(&self, e: Expr) -> bool {
+        self.entry(e).properties.known.signs.within(Signs::NOT_ZERO)
+    }
+
     /// Whether the expression is known to be above zero.
     pub fn positive(&self, e: Expr) -> bool {
         self.claims(e, Signs::PLUS, Decided::POSITIVE)

@@ -78,10 +78,11 @@ pub(super) fn cost(x: &Exprs, graph: &BondGraph, solved: &Solved, point: &mut Nu
 }
 
 /// Whether a divisor is zero within rounding error at a point.
-pub(super) fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
+pub(crate) fn vanishes(x: &Exprs, divisor: Expr, point: &mut NumericPoint) -> bool {
     match x.node(divisor) {
         Node::Mul(factors) => factors.iter().any(|&f| vanishes(x, f, point)),
         Node::Pow(base, _) => vanishes(x, *base, point),
+        Node::Whole(part) => vanishes(x, *part, point),
         Node::Add(_) | Node::Call(..) => {
             let size = natural_size(x, divisor, point, &mut BTreeMap::new());
             point.value(x, divisor).abs() <= VANISHING * size
@@ -107,6 +108,7 @@ fn natural_size(x: &Exprs, e: Expr, point: &mut NumericPoint, known: &mut BTreeM
             if n < 0 { 1.0 / power } else { power }
         }
         Node::Call(..) => 1.0_f64.max(point.value(x, e).abs()),
+        Node::Whole(part) => natural_size(x, *part, point, known),
         _ => point.value(x, e).abs(),
     };
     known.insert(e, size);

@@ -37,7 +37,7 @@ use crate::ids::{Map, Table};
 pub use assign::assign_causality;
 pub use carried::{reading_shares, shares};
 pub use contradiction::warnings;
-pub(crate) use digits::magnitude_of_slope;
+pub(crate) use digits::{magnitude_of_slope, vanishes};
 pub use drawn::{as_drawn, by_hand, resistors_first, without_constraints};
 pub use modes::in_first_mode;
 pub use ports::Virtual;

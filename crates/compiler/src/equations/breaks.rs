@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::along::AlgebraicConstraint;
 use super::definitions::Definitions;
 use super::{AlgebraicRole, BreakBound};
-use crate::algebra::Symbol;
+use crate::algebra::{Expr, Exprs, Symbol};
 use crate::bond_graph::{BondId, Kind, Meaning, PortRef};
-use crate::causal_graph::Stroke;
 use crate::causal_graph::break_set::{break_set, cyclic_components, restrict};
 use crate::causal_graph::signals::{NodeId, signal_graph};
+use crate::causal_graph::start_point::start_point;
+use crate::causal_graph::{Stroke, vanishes};
 use crate::ids::{Id, Table};
 
 /// Opens every loop on the way to the wanted symbols: first at the break variables of the zero-order causal paths along
@@ -24,8 +25,8 @@ pub fn open_loops(
     let set = break_set(&signals.algebraic_successors(), &signals.break_ranks());
     let first: Vec<Symbol> = set.vertices.iter().map(|&v| NodeId::new(v).symbol(d.graph)).collect();
     let mut bound = BreakBound::default();
-    let mut cut: BTreeSet<Symbol> = BTreeSet::new();
-    let mut planned = set.lower_bound;
+    let mut cut = divided_by_nothing(d, &Web::new(d, wanted, &BTreeSet::new(), closed));
+    let mut planned = cut.len() + set.lower_bound;
     for stage in [Some(&first), None] {
         let web = Web::new(d, wanted, &cut, closed);
         for component in cyclic_components(&web.successors) {
@@ -47,6 +48,25 @@ pub fn open_loops(
     (constraints, bound)
 }
 
+/// Variables that their strokes divide by what vanishes at the start, as moduli along the axes of bodies do where these stand
+/// straight: they are unknowns, and what divides them a factor of theirs.
+fn divided_by_nothing(d: &Definitions, web: &Web) -> BTreeSet<Symbol> {
+    let divisors = |s: &Symbol| d.of.get(s).map_or(Vec::new(), |of| d.x.divisors_of_terms(of.expr(), &moves));
+    let divided: Vec<(Symbol, Vec<(Expr, i64)>)> =
+        web.symbols.iter().map(|s| (*s, divisors(s))).filter(|(_, divisors)| !divisors.is_empty()).collect();
+    if divided.is_empty() {
+        return BTreeSet::new();
+    }
+    let mut start = start_point(&d.x, d.graph);
+    let mut begins_at_0 = |(e, _): &(Expr, i64)| vanishes(&d.x, *e, &mut start);
+    divided.into_iter().filter(|(_, divisors)| divisors.iter().any(&mut begins_at_0)).map(|(s, _)| s).collect()
+}
+
+/// Whether a modulus may pass through 0, or begin there.
+fn moves(x: &Exprs, e: Expr) -> bool {
+    !x.is_nonzero_by_itself(e) && x.depends_on_any(e, &|s| x.facts(s).given.is_none())
+}
+
 fn close(d: &mut Definitions, symbol: Symbol) -> AlgebraicConstraint {
     let definition = d.of.remove(&symbol).expect("loops run through what is defined");
     d.free.insert(symbol);
@@ -57,6 +77,7 @@ fn close(d: &mut Definitions, symbol: Symbol) -> AlgebraicConstraint {
         }
         super::definitions::Definition::Implicit(e) => e,
     };
+    let residual = d.x.without_divisors(residual, &moves);
     AlgebraicConstraint { unknown: Some((symbol, AlgebraicRole::Break)), residual }
 }
 

@@ -5,7 +5,7 @@
 //! differentiated `k` times, an unknown has an index of at most `k` if they determine its rate. For semi-explicit systems
 //! in Hessenberg form, which these are, that is the differentiation index.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::definitions::Definitions;
 use super::{Algebraic, EquationStep, LinearBlock, NewtonBlock, State, StateKind};
@@ -51,10 +51,10 @@ pub fn indices(
         return plain;
     }
     let promised = |indices: Vec<u8>| Indices { index: indices.iter().copied().max().unwrap_or(0), indices, ..plain };
+    let promise = promised(promised_indices(d, states, algebraic, steps, residuals));
     if n > EXAMINED {
-        return promised(promised_indices(states, algebraic));
+        return promise;
     }
-    let promise = promised(promised_indices(states, algebraic));
     let mut first = None;
     for size in SIZES {
         let rows = Linearised::of(d, size, states, algebraic, steps).rows(states, residuals);
@@ -92,9 +92,33 @@ fn indices_at(rows: &[Linear], states: &[State], algebraic: &[Algebraic]) -> Ind
     Indices { index, indices, counts }
 }
 
-/// What a form promises of its unknowns: multipliers hold relations among states, break variables among themselves.
-fn promised_indices(states: &[State], algebraic: &[Algebraic]) -> Vec<u8> {
-    let of = |a: &Algebraic| if matches!(a.cause, super::AlgebraicRole::Multiplier(_)) { 2 } else { 1 };
+/// What a form promises of its unknowns: multipliers hold relations among states, and with them break variables whose
+/// equations read multipliers; other break variables hold among themselves.
+fn promised_indices(
+    d: &Definitions,
+    states: &[State],
+    algebraic: &[Algebraic],
+    steps: &[EquationStep],
+    residuals: &[Expr],
+) -> Vec<u8> {
+    let multipliers = algebraic.iter().filter(|a| matches!(a.cause, super::AlgebraicRole::Multiplier(_)));
+    let mut higher: BTreeSet<Symbol> = multipliers.map(|a| a.symbol).collect();
+    let own = &residuals[residuals.len() - algebraic.len()..];
+    loop {
+        let before = higher.len();
+        let mut along = higher.clone();
+        let reads = |along: &BTreeSet<Symbol>, e: &Expr| d.x.depends_on_any(*e, &|s| along.contains(&s));
+        for step in steps {
+            if step.read().iter().any(|e| reads(&along, e)) {
+                along.extend(step.defined());
+            }
+        }
+        higher.extend(algebraic.iter().zip(own).filter(|(_, e)| reads(&along, e)).map(|(a, _)| a.symbol));
+        if higher.len() == before {
+            break;
+        }
+    }
+    let of = |a: &Algebraic| if higher.contains(&a.symbol) { 2 } else { 1 };
     states.iter().map(|_| 1).chain(algebraic.iter().map(of)).collect()
 }
 
@@ -306,6 +330,21 @@ impl EquationStep {
                 unknowns.contains(&symbol) || body.iter().any(|(own, _)| *own == symbol)
             }
             EquationStep::Guard { .. } => false,
+        }
+    }
+
+    /// All expressions that the step evaluates for what it defines.
+    fn read(&self) -> Vec<Expr> {
+        match self {
+            EquationStep::Assign { value, .. } => vec![*value],
+            EquationStep::Linear(block) => {
+                let entries = block.matrix.rows().flatten().map(|(_, e)| *e);
+                entries.chain(block.right.iter().copied()).collect()
+            }
+            EquationStep::Newton(block) => {
+                block.body.iter().map(|(_, e)| *e).chain(block.residuals.iter().copied()).collect()
+            }
+            EquationStep::Guard { .. } => Vec::new(),
         }
     }
 }

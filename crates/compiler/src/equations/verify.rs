@@ -54,7 +54,7 @@ fn once<'a, T: Ord + 'a>(all: impl Iterator<Item = &'a T>, breach: impl Fn(&T) -
 
 impl EquationStep {
     /// The symbols that the step defines; the body of an iteration is written out after it once more.
-    fn defined(&self) -> Vec<Symbol> {
+    pub(super) fn defined(&self) -> Vec<Symbol> {
         match self {
             EquationStep::Assign { symbol, .. } => vec![*symbol],
             EquationStep::Linear(block) => block.unknowns.clone(),

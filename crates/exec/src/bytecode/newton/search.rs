@@ -141,7 +141,11 @@ impl Frame {
         let newton = self.newton_of(solve);
         newton.start_at_previous();
         let first = self.iterate(solve, Globalization::Damped);
-        if first.is_ok() && self.is_continuation(solve)
+        // A root that is the previous one to the last bit is no other, small as all unknowns are beside what rounding makes of them.
+        let newton = self.newton_of(solve);
+        let stays = first.is_ok() && newton.x == newton.previous;
+        if stays
+            || first.is_ok() && self.is_continuation(solve)
             || first.is_ok() && self.newton_of(solve).following && self.is_unique_near_path(solve)
             || self.previous_is_root(solve)
             || self.solve_rank_deficient(solve)

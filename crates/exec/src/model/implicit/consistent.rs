@@ -2,7 +2,7 @@
 
 use super::super::minimum_norm;
 use super::ImplicitModel;
-use crate::bytecode::SolveError;
+use crate::bytecode::{Hold, SolveError};
 use halfarrow_sim::{Failure, System as _};
 
 /// Passes of Newton on states of the minimal form.
@@ -200,6 +200,19 @@ impl ImplicitModel {
     /// a higher index do not act back on the motion, so that no step is made shorter for them.
     pub(super) fn controlled(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         self.follow_back(t, y, yp)?;
+        self.place(t, y, yp);
+        // At an event rounding may have left the reference before a border that the form had passed: but where this one is about to
+        // leave a side itself, the sides of the reference are those of its values.
+        let held = self.reference.frame.conditions.held();
+        if self.form.holds_its_sides(t)? {
+            self.reference.frame.conditions.state = Hold::Follow;
+        }
+        let found = self.controlled_where_it_stands(t, y, yp);
+        self.reference.frame.conditions.hold_again(&held);
+        found
+    }
+
+    fn controlled_where_it_stands(&mut self, t: f64, y: &[f64], yp: &[f64]) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         let (mut whole, mut rates) = (y.to_vec(), yp.to_vec());
         self.take_over(t, &mut whole)?;
         for i in (0..y.len()).filter(|i| !self.map.uncontrolled.contains(i)) {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::ImplicitModel;
 use halfarrow_compiler::program::{Observed, State};
-use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, System as _, halves, halves_mut};
+use halfarrow_sim::{Events, Failure, ImplicitSystem, Sparsity, StepEnd, System as _, halves, halves_mut};
 
 impl ImplicitModel {
     /// Of the clauses that happen, those that rounding leaves before their border in the reference. Where no state moves, they
@@ -209,8 +209,8 @@ impl Events for ImplicitModel {
         self.settle(t, y, yp)
     }
 
-    fn exchange_independent(&mut self, t: f64, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        if self.has_modes() && self.entered.is_none() && !failed {
+    fn exchange_independent(&mut self, t: f64, point: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
+        if self.has_modes() && self.entered.is_none() && step != StepEnd::Failed {
             let (y, yp) = halves(point);
             self.settle_untold(t, y, yp)?;
         }

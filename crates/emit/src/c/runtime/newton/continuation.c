@@ -416,6 +416,19 @@ static int ha_continue_far(ha_model *m, ha_newton *w)
     return $ha_iterate(m, w, HA_FAR) && $ha_is_unique_near_path(m, w);
 }
 
+//item ha_stays
+/* Whether the root found is the previous one. */
+static int ha_stays(const ha_newton *w)
+{
+    int i;
+    for (i = 0; i < w->n; ++i) {
+        if (w->x[i] != w->previous[i]) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 //item ha_continue_root
 /* The root that continues the previous solution: 0, or why there is none. */
 static int ha_continue_root(ha_model *m, ha_newton *w, int number)
@@ -432,7 +445,7 @@ static int ha_continue_root(ha_model *m, ha_newton *w, int number)
 //end
     $ha_start_at_previous(w);
     if ($ha_iterate(m, w, HA_DAMPED)) {
-        if ($ha_is_continuation(w) || (w->following && $ha_is_unique_near_path(m, w))) {
+        if ($ha_stays(w) || $ha_is_continuation(w) || (w->following && $ha_is_unique_near_path(m, w))) {
             return $MODEL_OK;
         }
         why = $MODEL_BRANCH;
