@@ -330,6 +330,53 @@ pub(crate) fn unique<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
         .collect()
 }
 
+/// Headers that the system has: a file of that name beside the sources would stand in their place.
+const HEADERS: &[&str] = &[
+    "alloca",
+    "assert",
+    "complex",
+    "ctype",
+    "dlfcn",
+    "errno",
+    "fcntl",
+    "fenv",
+    "float",
+    "inttypes",
+    "iso646",
+    "libc",
+    "limits",
+    "locale",
+    "malloc",
+    "math",
+    "memory",
+    "process",
+    "pthread",
+    "sched",
+    "search",
+    "setjmp",
+    "signal",
+    "stdalign",
+    "stdarg",
+    "stdatomic",
+    "stdbool",
+    "stddef",
+    "stdint",
+    "stdio",
+    "stdlib",
+    "stdnoreturn",
+    "string",
+    "strings",
+    "tgmath",
+    "threads",
+    "time",
+    "uchar",
+    "unistd",
+    "values",
+    "wchar",
+    "wctype",
+    "windows",
+];
+
 /// The name of a model in files and functions: `QuarterCar` is `quarter_car`.
 pub(crate) fn of_model(name: &str) -> String {
     let mut out = String::new();
@@ -345,7 +392,7 @@ pub(crate) fn of_model(name: &str) -> String {
         out.push(c.to_ascii_lowercase());
         before = c;
     }
-    if TAKEN.contains(&out.as_str()) || out.starts_with("ha_") {
+    if TAKEN.contains(&out.as_str()) || HEADERS.contains(&out.as_str()) || out.starts_with("ha_") {
         out.push_str("_model");
     }
     out
@@ -361,6 +408,7 @@ mod tests {
         assert_eq!(of_model("RCBridge"), "rc_bridge");
         assert_eq!(of_model("Class2Class4"), "class2_class4");
         assert_eq!(of_model("Double"), "double_model");
+        assert_eq!(of_model("Math"), "math_model");
         assert_eq!(word("body.p"), "body_p");
         assert_eq!(word("φ'"), "phi_rate");
         assert_eq!(word("2Ω€"), "v2Omegau20ac");

@@ -26,7 +26,7 @@ pub mod wide;
 
 pub use adjoint::{Backwards, Transposed, follow_back};
 pub use driver::{Crawl, INSIDE, Nobody, Position, Sink, Stopped, Summary, inside, tick};
-pub use events::Events;
+pub use events::{Events, StepEnd};
 pub use failure::{Affected, Failure, Leap};
 pub use implicit::simulate_implicit;
 pub use implicit_system::{HybridImplicitSystem, ImplicitSystem, halves, halves_mut};

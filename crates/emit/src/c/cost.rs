@@ -178,6 +178,8 @@ pub struct Cost {
     pub memory: u64,
     /// Modes of set-valued laws, each with equations of its own; 0 without such laws.
     pub modes: u64,
+    /// Whether the equations keep their independent variables where others would tell the motion.
+    pub keeps_variables: bool,
 }
 
 /// Jumps within one step at most.
@@ -213,6 +215,7 @@ impl Cost {
             delay_points: plan.delays.iter().map(|d| d.1 as u64).sum(),
             memory: (s.memory + s.work + s.crossing + s.factors + s.derived) as u64,
             modes: 0,
+            keeps_variables: plan.watched.is_some(),
         }
     }
 
@@ -235,6 +238,7 @@ impl Cost {
             delay_points: most(|c| c.delay_points),
             memory: most(|c| c.memory),
             modes: tried,
+            keeps_variables: plans.iter().any(|plan| plan.watched.is_some()),
         }
     }
 
@@ -268,6 +272,12 @@ impl Cost {
                 "{} modes in a table, each with equations of its own; where one ends each may be tried",
                 self.modes
             ));
+        }
+        if self.keeps_variables {
+            lines.push(
+                "one choice of independent variables: it stops where a position is passed at which they do not tell the motion"
+                    .to_string(),
+            );
         }
         lines
     }

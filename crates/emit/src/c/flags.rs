@@ -144,6 +144,10 @@ flags! {
     /// Such with other independent variables, in any mode and from this one.
     exchanges
     ratios
+    /// No others may be, and it is watched whether those that are tell the motion.
+    watches
+    /// One or the other.
+    may_pass
     /// Set-valued laws.
     bounds
     /// Gaps among their bounds; such whose sides meet with an impulse, in this mode and in any.

@@ -117,6 +117,7 @@ fn private_of(plan: &Plan) -> Vec<Members> {
     let mut list = List::default();
     of_parameters(&mut list, plan);
     of_events(&mut list, plan);
+    of_ratios(&mut list, plan);
     of_modes(&mut list, plan);
     of_blocks(&mut list, plan);
     of_steps(&mut list, plan);
@@ -244,6 +245,21 @@ fn of_clauses(list: &mut List, plan: &Plan) {
     }
 }
 
+fn of_ratios(list: &mut List, plan: &Plan) {
+    if !plan.may_pass() {
+        return;
+    }
+    list.one(Kind::Int, &["pivots_known"], "whether it is known what ratios of speeds are divided by");
+    let pivots = plan.ratios().map_or(0, |ratios| ratios.pivots.len());
+    list.arrays(Kind::Real, &["pivots"], pivots, "what they were divided by when they were last looked at");
+    list.one(
+        Kind::Int,
+        &["steepest_known", "steepest_at"],
+        "whether the greatest of them was known then, which it was",
+    );
+    list.one(Kind::Real, &["steepest"], "and how great");
+}
+
 fn of_modes(list: &mut List, plan: &Plan) {
     let Some(tables) = &plan.mode else { return };
     let (p, modes) = (plan.program, tables.modes);
@@ -257,9 +273,6 @@ fn of_modes(list: &mut List, plan: &Plan) {
     if modes.exchanged() > 0 {
         list.one(Kind::Wide, &["exchanged_at"], "where a step has failed and others were tried");
         list.one(Kind::Int, &["exchange_due"], "whether others should be independent");
-        list.one(Kind::Int, &["pivots_known"], "whether it is known what ratios of speeds are divided by");
-        let pivots = tables.ratios.as_ref().map_or(0, |ratios| ratios.pivots.len());
-        list.arrays(Kind::Real, &["pivots"], pivots, "what they were divided by when they were last looked at");
         list.arrays(Kind::Real, &["left_x"], p.states.len(), "");
         list.arrays(Kind::Byte, &["taken_over"], modes.exchanged(), "those that have taken over last");
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Assumption, Clause, DomainKind, LawDomain, PivotGuard, first_of};
+use halfarrow_compiler::program::{Assumption, Clause, DomainKind, LawDomain, PivotGuard, Told, first_of};
 
 use super::fragment::{Fragment, Kind};
 use super::plan::Plan;
@@ -68,6 +68,7 @@ fn texts(plan: &Plan) -> Vec<(&'static str, Vec<String>)> {
                 format!("the positions {what} cannot be followed: a step is too long for that, the machine is at its limit, or another motion leads through the same position; make the step shorter{kept}")
             }),
         ),
+        ("PASSED", passed(plan)),
         (
             "NOT_PUT_BACK",
             vec!["no positions near are on the relations that their speeds keep: make the step shorter".into()],
@@ -194,6 +195,22 @@ fn domain(d: &LawDomain) -> String {
     format!("{what} is asked for a value where it has none: {asked} needs {needs}")
 }
 
+/// That a position has been passed at which these variables do not tell the motion.
+fn passed(plan: &Plan) -> Vec<String> {
+    let program = plan.program;
+    let name = |told: Told| match told {
+        Told::State(k) => program.states[k as usize].name.clone(),
+        Told::Conserved(k) => program.conserved[k as usize].clone(),
+    };
+    let names: Vec<String> = plan.ratios().iter().flat_map(|r| &r.independent).map(|k| name(k.2)).collect();
+    let remedy = match plan.mode {
+        Some(_) => "make the step shorter; the table of modes may lack the variables that tell it there",
+        None => "make the step shorter, or name others with `prefer`: here exported code keeps its own",
+    };
+    let what = first_of(&names.join(", "));
+    vec![format!("the motion does not follow from {what} at a position that has been passed: {remedy}")]
+}
+
 /// The codes, as the lines of an enumeration.
 pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
     let meaning = |code: &str| match code {
@@ -201,6 +218,7 @@ pub(super) fn codes(plan: &Plan) -> Vec<(&'static str, &'static str)> {
         "SINGULAR" => "linear equations have no unique solution",
         "NO_CONVERGENCE" => "nonlinear equations have no solution, or none was found",
         "BRANCH" => "the solution that was followed ends",
+        "PASSED" => "a position was passed at which independent variables do not tell the motion",
         "NOT_PUT_BACK" => "positions that cannot be put back onto what their speeds keep",
         "BOUND" => "the bound on evaluations is hit",
         "OUT_OF_DOMAIN" => "a law is asked for a value where it has none",
@@ -242,6 +260,7 @@ fn can_happen(code: &str, plan: &Plan) -> bool {
         "LOST" => !plan.events.returning.is_empty(),
         "RESET_DEPENDENT" | "RESET_UNMET" => plan.program.jumps.is_some(),
         "NO_MODE" | "STUCK" | "OVERLAP" => !plan.program.set_valued.is_empty(),
+        "PASSED" => plan.may_pass(),
         "NOT_PUT_BACK" => !plan.relations().is_empty(),
         "CONSTRAINT_BROKEN" => !plan.events.positions.is_empty(),
         _ => true,

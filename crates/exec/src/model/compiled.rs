@@ -135,6 +135,28 @@ impl Compiled {
         self.mode_of(Key { branches, independent: wanted.to_vec(), told: None }, point)
     }
 
+    /// The mode with the branches of `present` in which these variables stay independent, made at the first of these points at
+    /// which they can be. `None` if they can at none.
+    pub(super) fn with_independent_near(
+        &self,
+        present: &Mode,
+        wanted: &[Symbol],
+        points: &[BTreeMap<Symbol, f64>],
+    ) -> Option<ModeId> {
+        let key = Key { branches: present.program.branches(), independent: wanted.to_vec(), told: None };
+        if let Some(known) = self.others().of.get(&key) {
+            return *known;
+        }
+        let alternatives = self.alternatives.as_ref()?;
+        let made = points.iter().find_map(|point| {
+            let program = self.fitting(alternatives.program(&key.branches, wanted, point).ok())?;
+            let mut own: Vec<Symbol> = program.exchanges.independent.iter().map(|e| e.symbol).collect();
+            own.sort_unstable();
+            (own == wanted).then_some(program)
+        });
+        self.added(key, made)
+    }
+
     /// The mode in which the branches of `present` hold, these variables stay independent, and positions follow from others as
     /// is best at a point. `None` if they do so in `present`.
     pub(super) fn decided_at(

@@ -9,8 +9,8 @@ use super::{DelayOrSample, Model};
 use crate::bytecode::{Frame, Hold, SolveError};
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::ids::Id;
-use halfarrow_compiler::program::{EventTrigger, Op, Reads, Value};
-use halfarrow_sim::{Affected, Events, Failure};
+use halfarrow_compiler::program::{ConditionId, EventTrigger, Op, Reads, Value};
+use halfarrow_sim::{Affected, Events, Failure, StepEnd};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Modes that one instant leads through at most.
@@ -141,6 +141,19 @@ impl Model {
         run.map_err(|error| self.failure(t, error))
     }
 
+    /// Whether all conditions of the state are on the sides that are held, where the model has been placed.
+    pub(super) fn holds_its_sides(&mut self, t: f64) -> Result<bool, Failure> {
+        let run = self.frame.run(&self.code.indicators);
+        run.map_err(|error| self.failure(t, error))?;
+        let (frame, floors) = (&self.frame, &self.run.floors);
+        let holds = |(&id, &register): (&ConditionId, &u32)| {
+            let operand = frame.r[register as usize];
+            let beyond = frame.conditions.beyond(id, operand, &frame.tables)[0];
+            beyond.abs() <= floors[id.0 as usize] || !frame.conditions.has_left(id, operand, &frame.tables)
+        };
+        Ok(self.code.switching.iter().zip(&self.code.indicators.outputs).all(holds))
+    }
+
     /// Handles an event. `told` says of some clauses that they happen, of those that another form of the model has seen.
     pub(super) fn handle(&mut self, t: f64, x: &mut [f64], told: &[bool]) -> Result<(), Failure> {
         self.frame.forget_orientations();
@@ -157,6 +170,8 @@ impl Model {
             self.take_stored(t, x)?;
         }
         self.run.crossed = t;
+        // Positions may be others after it.
+        self.run.steepest = None;
         self.rated = None;
         let inputs = &self.setup.inputs;
         self.run.pieces.iter_mut().zip(inputs).for_each(|(piece, signal)| *piece = signal.piece(t));
@@ -217,11 +232,11 @@ impl Model {
     }
 
     /// Goes on in another mode: where the present one has ended, or with other independent variables.
-    fn exchange_or_settle(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+    fn exchange_or_settle(&mut self, t: f64, x: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
         if std::mem::take(&mut self.switched) {
             return Ok(true);
         }
-        if !failed && self.is_margin_below(t, x)? {
+        if step != StepEnd::Failed && self.is_margin_below(t, x)? {
             self.keeping(t, x, |model, x| {
                 model.find_fired(t, x, &[])?;
                 model.settle_all(t, x)
@@ -230,7 +245,7 @@ impl Model {
                 return Ok(true);
             }
         }
-        self.exchange(t, x, failed)
+        self.exchange(t, x, step)
     }
 
     pub(super) fn has_delays(&self) -> bool {
@@ -301,8 +316,8 @@ impl Events for Model {
         self.keeping(t, x, |model, x| model.handle(t, x, &[]))
     }
 
-    fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        self.exchange_or_settle(t, x, failed)
+    fn exchange_independent(&mut self, t: f64, x: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
+        self.exchange_or_settle(t, x, step)
     }
 
     fn project(&mut self, t: f64, x: &mut [f64]) -> Result<bool, Failure> {

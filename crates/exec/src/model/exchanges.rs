@@ -9,8 +9,8 @@ use super::system::What;
 use super::{Model, clauses::EventWork};
 use crate::bytecode::{Frame, Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Told, Value};
-use halfarrow_sim::Failure;
+use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Told, Value, first_of};
+use halfarrow_sim::{Failure, StepEnd};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -18,8 +18,15 @@ use std::sync::Arc;
 const FAR: f64 = 10.0;
 /// or where a step has failed and it moves so many times as fast,
 const AFTER_FAILURE: f64 = 1.2;
+/// or where it moves so many times as fast, and by so many times more than when that was looked at last: steps whose error nothing
+/// controls are long beside the way that is left to a singular position;
+const GROWING: f64 = 1.2;
+const OUTGROWS: f64 = 1.1;
 /// and then until none moves so many times as fast.
 const NEAR: f64 = 1.1;
+/// A ratio that changes its sign has passed a position where the independent variables do not tell the motion if it is so great on
+/// both sides: where numerator and divisor vanish together, as in a flat parallelogram, it is rounding there, but not beside it.
+const PASSED: f64 = 5.0;
 /// What varies less than by this part of the greatest is rounding.
 const ROUNDING: f64 = 1e-12;
 /// Ratios are looked at where what they are divided by has come to less than this part of what it was when they were last.
@@ -63,6 +70,11 @@ impl Ratios {
         })
     }
 
+    /// How many things that vary they are divided by.
+    pub fn divisors(&self) -> usize {
+        self.pivots.outputs.len()
+    }
+
     pub fn routines(&self) -> [&Routine; 2] {
         [&self.routine, &self.pivots]
     }
@@ -77,13 +89,13 @@ impl Model {
     }
 
     /// Looks whether other variables should be independent from `(t, x)` on, and makes them so: then `x` is the same
-    /// position and motion in the new ones. `failed`: a step from here has failed.
-    pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+    /// position and motion in the new ones.
+    pub(super) fn exchange(&mut self, t: f64, x: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
         if self.variation.is_some() {
-            self.outlive(t, x, failed);
+            self.outlive(t, x, step == StepEnd::Failed);
             return Ok(false);
         }
-        if self.exchange_speeds(t, x, failed)? {
+        if self.exchange_speeds(t, x, step)? {
             return Ok(true);
         }
         Ok(self.positions_turn() && self.exchange_positions(t, x)?)
@@ -180,19 +192,32 @@ impl Model {
         if !self.is_due(ratios, t, x, failed) {
             return;
         }
-        let outlived = self.is_suspicious(ratios, t, x, most) && self.better(ratios, t, x, most).is_some();
+        let steep = self.steepest(ratios, None, t, x).is_some_and(|(now, _)| now.value.abs() > most);
+        let outlived = steep && self.better(ratios, t, x, most).is_some();
         if let Some(variation) = &mut self.variation {
             variation.outlived = outlived;
         }
     }
 
-    fn exchange_speeds(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
+    fn exchange_speeds(&mut self, t: f64, x: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
         let code = self.code.clone();
-        let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else {
+        let Some(ratios) = code.exchanges.as_ref() else { return Ok(false) };
+        let failed = step == StepEnd::Failed;
+        if !self.is_due(ratios, t, x, failed) {
             return Ok(false);
+        }
+        let before = self.run.steepest.take();
+        let Some((now, at_before)) = self.steepest(ratios, before, t, x) else { return Ok(false) };
+        self.run.steepest = Some(now);
+        if before.is_some_and(|before| before.is_passed(at_before)) {
+            return Err(self.passed(ratios, t));
+        }
+        let most = match step {
+            StepEnd::Failed => AFTER_FAILURE,
+            StepEnd::Fixed if before.is_some_and(|before| now.outgrows(before)) => GROWING,
+            _ => FAR,
         };
-        let most = if failed { AFTER_FAILURE } else { FAR };
-        if !self.is_due(ratios, t, x, failed) || !self.is_suspicious(ratios, t, x, most) {
+        if now.value.abs() <= most || !self.compiled.has_alternatives() {
             return Ok(false);
         }
         let Some(wanted) = self.better(ratios, t, x, most) else {
@@ -203,6 +228,17 @@ impl Model {
             Some(mode) => self.go_over(mode, t, x, &values),
             None => Ok(false),
         }
+    }
+
+    /// A position has been passed where the independent variables do not tell the motion: behind it the run has no meaning.
+    fn passed(&self, ratios: &Ratios, time: f64) -> Failure {
+        let (program, states) = (&self.code.program, self.code.layout.states);
+        let name = |&register: &u32| match register.checked_sub(states) {
+            Some(k) => program.states[k as usize].name.clone(),
+            None => program.conserved[(register - self.code.layout.conserved) as usize].clone(),
+        };
+        let names: Vec<String> = ratios.registers.iter().map(name).collect();
+        Failure::Singular { time, what: format!("what moves with {}", first_of(&names.join(", "))) }
     }
 
     /// Goes on in a mode with the same position and motion; `false`, with nothing changed, if it cannot tell them.
@@ -256,29 +292,50 @@ impl Model {
         now.zip(&self.run.pivots).any(|(now, before)| (now / before).is_nan() || now / before <= SMALLER)
     }
 
-    /// Whether some variable may move `most` times as fast as all that are independent. Takes no memory.
-    fn is_suspicious(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> bool {
+    /// The greatest ratio of how variables move to how the independent ones do, and what it is now at the place where it was
+    /// greatest before; `None` where they have no value. Takes no memory where each independent variable is a state.
+    fn steepest(
+        &mut self,
+        ratios: &Ratios,
+        before: Option<Steepest>,
+        t: f64,
+        x: &[f64],
+    ) -> Option<(Steepest, Option<f64>)> {
         let n = ratios.independent.len();
-        ratios.registers.iter().enumerate().any(|(k, &register)| {
+        let (mut most, mut at_before) = (Steepest { row: 0, column: 0, value: 0.0 }, None);
+        for (column, &register) in ratios.registers.iter().enumerate() {
             if !self.move_by(ratios, register, t, x) {
-                return true;
+                return None;
             }
             let (own, others) = ratios.routine.outputs.split_at(n);
+            let rate = |register: u32| self.frame.d[register as usize];
             // A momentum, or what is conserved, moves several of them: what follows from each is not seen from that alone.
-            if own.iter().enumerate().any(|(i, &r)| i != k && self.frame.d[r as usize] != 0.0) {
-                return true;
+            if own.iter().enumerate().any(|(i, &r)| i != column && rate(r) != 0.0) {
+                let table = self.table(ratios, t, x)?;
+                let value = |s: Steepest| table.ratios[s.row * n + s.column];
+                let (row, column, _) = table.greatest()?;
+                let most = Steepest { row, column, value: 0.0 };
+                return Some((Steepest { value: value(most), ..most }, before.map(value)));
             }
-            let fastest = |all: &[Exchanged], registers: &[u32]| {
-                let rates = registers.iter().map(|&r| self.frame.d[r as usize]);
-                all.iter().zip(rates).fold(0.0f64, |most, (e, rate)| most.max(e.weighs() * rate.abs()))
-            };
-            let ratio = fastest(&ratios.dependent, others) / fastest(&ratios.independent, own);
-            ratio.is_nan() || ratio > most / n as f64
-        })
+            let unit = ratios.independent[column].weighs() * rate(own[column]);
+            for (row, (dependent, &other)) in ratios.dependent.iter().zip(others).enumerate() {
+                let value = dependent.weighs() * rate(other) / unit;
+                if !value.is_finite() {
+                    return None;
+                }
+                if value.abs() > most.value.abs() {
+                    most = Steepest { row, column, value };
+                }
+                if before.is_some_and(|before| (before.row, before.column) == (row, column)) {
+                    at_before = Some(value);
+                }
+            }
+        }
+        Some((most, at_before))
     }
 
-    /// The variables that should be independent instead of those that are, if some should.
-    fn better(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> Option<Vec<Symbol>> {
+    /// How the dependent variables move with the independent ones, all in their weights.
+    fn table(&mut self, ratios: &Ratios, t: f64, x: &[f64]) -> Option<Table> {
         let (n, m) = (ratios.independent.len(), ratios.dependent.len());
         // Column by column: how all of them move with each state or constant.
         let mut columns = Vec::with_capacity(n);
@@ -290,9 +347,16 @@ impl Model {
             columns.push(column);
         }
         let mut table = Table::new(&columns, n, m)?;
-        let all: Vec<Exchanged> = ratios.independent.iter().chain(&ratios.dependent).copied().collect();
-        let weights: Vec<f64> = all.iter().map(Exchanged::weighs).collect();
+        let weights: Vec<f64> = ratios.independent.iter().chain(&ratios.dependent).map(Exchanged::weighs).collect();
         table.weigh(&weights);
+        Some(table)
+    }
+
+    /// The variables that should be independent instead of those that are, if some should.
+    fn better(&mut self, ratios: &Ratios, t: f64, x: &[f64], most: f64) -> Option<Vec<Symbol>> {
+        let (n, m) = (ratios.independent.len(), ratios.dependent.len());
+        let mut table = self.table(ratios, t, x)?;
+        let all: Vec<Exchanged> = ratios.independent.iter().chain(&ratios.dependent).copied().collect();
         if table.greatest().is_none_or(|(_, _, ratio)| ratio <= most) {
             return None;
         }
@@ -353,6 +417,8 @@ impl Model {
         run.mode = mode;
         run.floors = vec![0.0; code.program.conditions.len()];
         run.pivots.clear();
+        run.pivots.reserve(code.exchanges.as_ref().map_or(0, Ratios::divisors));
+        run.steepest = None;
         run.determinants.clear();
         run.determinants.reserve(code.motion.as_ref().map_or(0, |motion| motion.blocks.len()));
         self.events = EventWork::of(&code);
@@ -471,6 +537,29 @@ impl Model {
             }
         }
         Ok(false)
+    }
+}
+
+/// The greatest ratio of how a dependent variable moves to how an independent one does, in their weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Steepest {
+    /// Which dependent variable,
+    row: usize,
+    /// and which independent one.
+    column: usize,
+    value: f64,
+}
+
+impl Steepest {
+    /// Whether the same ratio has grown from `before` so that some steps more lead beyond all bounds.
+    fn outgrows(self, before: Steepest) -> bool {
+        let same = (self.row, self.column) == (before.row, before.column);
+        same && self.value * before.value > 0.0 && self.value.abs() >= OUTGROWS * before.value.abs()
+    }
+
+    /// Whether it has become `now` through all bounds.
+    fn is_passed(self, now: Option<f64>) -> bool {
+        now.is_some_and(|now| now * self.value < 0.0 && now.abs().min(self.value.abs()) > PASSED)
     }
 }
 

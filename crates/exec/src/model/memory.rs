@@ -4,6 +4,7 @@ use super::Model;
 use super::clause_memory::ClauseMemory;
 use super::clauses::Return;
 use super::compiled::ModeId;
+use super::exchanges::Steepest;
 use super::history::{Delay, Sample};
 use super::inputs::PointRange;
 use super::modes::Extents;
@@ -62,6 +63,8 @@ pub(super) struct Remembered {
     pub floors: Vec<f64>,
     /// What ratios between variables were divided by when it was last seen whether others should be independent.
     pub pivots: Vec<f64>,
+    /// The greatest of these ratios then.
+    pub steepest: Option<Steepest>,
     /// For each block of computed positions the greatest determinant of its equations since it was looked at, as a logarithm.
     pub determinants: Vec<f64>,
     /// What relations between positions keep.

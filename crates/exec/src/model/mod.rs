@@ -51,6 +51,7 @@ pub use wide::WideModel;
 use crate::bytecode::{Frame, Hold, SolveError};
 use clauses::EventWork;
 use compiled::Mode;
+use exchanges::Ratios;
 use halfarrow_compiler::program::{Assumption, BlockId, Program, Reads, Value, first_of};
 use halfarrow_sim::{Failure, Leap};
 use inputs::InputSignal;
@@ -145,7 +146,8 @@ impl Model {
             extents: Extents::default(),
             returns: Vec::with_capacity(code.clauses.conditional.len()),
             floors: vec![0.0; code.program.conditions.len()],
-            pivots: Vec::new(),
+            pivots: Vec::with_capacity(code.exchanges.as_ref().map_or(0, Ratios::divisors)),
+            steepest: None,
             determinants: Vec::new(),
             kept: Kept::default(),
             pieces: vec![None; code.program.inputs.len()],

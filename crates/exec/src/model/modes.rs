@@ -36,6 +36,11 @@ pub struct ModeProgram {
     pub independent: Vec<Symbol>,
 }
 
+/// How far beside a start equations of other modes are made, in magnitudes of the states, where they cannot be there;
+const BESIDE: [f64; 6] = [0.1, -0.1, 0.01, -0.01, 1e-4, -1e-4];
+/// and the golden ratio, by which states are moved unequally.
+const UNEQUAL: f64 = 0.618_033_988_749_894_9;
+
 /// The sets of so many of these, if there are no more than `most`.
 fn subsets(all: &[Symbol], size: usize, most: usize) -> Option<Vec<Vec<Symbol>>> {
     let mut sets: Vec<Vec<Symbol>> = vec![Vec::new()];
@@ -203,7 +208,7 @@ impl Model {
         let others = all.iter().filter(|branches| **branches != present);
         // Models of one mode keep no place for all variables.
         let changes = all.len() > 1 || self.code.exchanges.is_some();
-        let point = if changes { self.values_of_all(t, x).unwrap_or_default() } else { BTreeMap::new() };
+        let points = if changes { self.points_near(t, x) } else { Vec::new() };
         let mut modes = Vec::new();
         for branches in std::iter::once(&present).chain(others) {
             let Some(first) = self.compiled.in_mode(branches) else { continue };
@@ -212,18 +217,40 @@ impl Model {
             let exchanges = &code.program.exchanges;
             let (own, dependent) = (of(&exchanges.independent), of(&exchanges.dependent));
             modes.extend(self.program_of(first, own.iter().copied().collect()));
-            let symbols: Vec<Symbol> = own.union(&dependent).copied().collect();
             if !self.compiled.has_alternatives() || code.exchanges.is_none() {
                 continue;
             }
-            for wanted in subsets(&symbols, own.len(), most_sets).into_iter().flatten() {
-                if !wanted.iter().copied().eq(own.iter().copied()) {
-                    let mode = self.compiled.with_independent(&code, &wanted, &point);
-                    modes.extend(mode.and_then(|mode| self.program_of(mode, wanted)));
-                }
+            // Other modes may know of more that could be independent.
+            let mut symbols: BTreeSet<Symbol> = own.union(&dependent).copied().collect();
+            let mut done = BTreeSet::from([own.iter().copied().collect::<Vec<Symbol>>()]);
+            loop {
+                let all: Vec<Symbol> = symbols.iter().copied().collect();
+                let sets = subsets(&all, own.len(), most_sets).unwrap_or_default();
+                let Some(wanted) = sets.into_iter().find(|set| !done.contains(set)) else { break };
+                done.insert(wanted.clone());
+                let Some(mode) = self.compiled.with_independent_near(&code, &wanted, &points) else { continue };
+                let exchanges = &self.compiled.mode(mode).program.exchanges;
+                symbols.extend(exchanges.independent.iter().chain(&exchanges.dependent).map(|e| e.symbol));
+                modes.extend(self.program_of(mode, wanted));
             }
         }
         Some(modes)
+    }
+
+    /// The variables of the graph at `(t, x)`, and at positions beside it: some choice of independent variables may be singular
+    /// where a machine begins, as along an axis.
+    fn points_near(&mut self, t: f64, x: &[f64]) -> Vec<BTreeMap<Symbol, f64>> {
+        let scales = self.run.scales.clone();
+        let beside = |part: f64| {
+            let moved = |(k, x): (usize, &f64)| {
+                let size = scales.get(k).copied().filter(|size| *size > 0.0).unwrap_or(1.0);
+                // No two states by the same.
+                x + part * size * (1.0 + UNEQUAL * k as f64).rem_euclid(1.0).max(UNEQUAL)
+            };
+            x.iter().enumerate().map(moved).collect::<Vec<f64>>()
+        };
+        let places = std::iter::once(x.to_vec()).chain(BESIDE.map(beside));
+        places.filter_map(|x| self.clone().values_of_all(t, &x).ok()).collect()
     }
 
     /// The program of a mode, if all that is recorded has a value there.

@@ -15,8 +15,8 @@ pub(crate) use stepper::{Flow, Stepper, Stop, is_at};
 
 use std::ops::ControlFlow;
 
-use crate::events::{Chatter, Events, Signs};
-use crate::{Failure, Options};
+use crate::events::{Chatter, Events, Signs, StepEnd};
+use crate::{Failure, Method, Options};
 use recording::Samples;
 
 /// What is not told apart where signs are looked at coarsely: part of the tolerance of a state, and of its magnitude.
@@ -261,7 +261,12 @@ impl<'a> Run<'a> {
         point: &mut [f64],
         failed: bool,
     ) -> Result<bool, Failure> {
-        let exchanged = events.exchange_independent(self.time, point, failed)?;
+        let step = match (failed, self.options.method) {
+            (true, _) => StepEnd::Failed,
+            (false, Method::Fixed(_)) => StepEnd::Fixed,
+            (false, _) => StepEnd::Controlled,
+        };
+        let exchanged = events.exchange_independent(self.time, point, step)?;
         if exchanged {
             self.counts.exchanges += 1;
             self.signs.renew(events.indicators());

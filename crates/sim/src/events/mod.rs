@@ -10,6 +10,17 @@ pub(crate) use signs::Signs;
 
 use crate::Failure;
 
+/// What has become of the last step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepEnd {
+    /// It has failed: the run stands where it began.
+    Failed,
+    /// Its error is what tolerances allow.
+    Controlled,
+    /// Its length was given: nothing says how exact it is.
+    Fixed,
+}
+
 /// The events of a system, and what can be seen of it where a run stands.
 ///
 /// A *point* is what a run moves: the states of a [`System`](crate::System); all unknowns, then all their rates, of an
@@ -81,8 +92,8 @@ pub trait Events {
     ///
     /// # Errors
     /// As [`event_indicators`](Events::event_indicators).
-    fn exchange_independent(&mut self, t: f64, point: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        let _ = (t, point, failed);
+    fn exchange_independent(&mut self, t: f64, point: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
+        let _ = (t, point, step);
         Ok(false)
     }
 

@@ -15,7 +15,9 @@ mod work;
 use std::rc::Rc;
 
 use halfarrow_compiler::bond_graph::HeldKind;
-use halfarrow_compiler::program::{Block, BlockId, Code, ConditionId, EventTrigger, Program, Routine, Step, Trigger};
+use halfarrow_compiler::program::{
+    Block, BlockId, Code, ConditionId, EventTrigger, Program, Ratios, Routine, Step, Trigger,
+};
 
 use super::Export;
 use super::blocks::{elimination_room, full_room};
@@ -58,6 +60,9 @@ pub(super) struct Plan<'a> {
     pub events: EventTables,
     /// Where this mode ends, and what is carried to the next one, if the model has several.
     pub mode: Option<ModeTables<'a>>,
+    /// Variables that could be independent in place of others, where code keeps those that are: it stops where these do not tell
+    /// the motion.
+    pub watched: Option<Ratios>,
     /// Whether runs begin in this mode.
     first: bool,
     /// Newton blocks in use.
@@ -125,6 +130,8 @@ struct Works {
     clock: OperationCount,
     /// A round of what happens at events.
     round: OperationCount,
+    /// A look whether the independent variables tell the motion.
+    watched: OperationCount,
 }
 
 impl<'a> Plan<'a> {
@@ -155,6 +162,7 @@ impl<'a> Plan<'a> {
             samples: held(program, |kind| kind == HeldKind::Sample),
             discretes: held(program, HeldKind::is_discrete),
             events: EventTables::of(program),
+            watched: if mode.is_some() { None } else { program.ratios() },
             mode,
             first,
             newton: Vec::new(),
@@ -246,9 +254,9 @@ impl<'a> Plan<'a> {
             if mode.has_laws() {
                 functions.extend(plain(&mut writer, "ha_compared_code", &routines.compared));
             }
-            if mode.ratios.is_some() {
-                functions.extend(plain(&mut writer, "ha_pivots_code", &routines.pivots));
-            }
+        }
+        if self.ratios().is_some() {
+            functions.extend(plain(&mut writer, "ha_pivots_code", &routines.pivots));
         }
         functions.extend(plain(&mut writer, "ha_relations_code", &routines.relations));
         functions.extend(self.domain_checks(&writer));
@@ -281,11 +289,11 @@ impl<'a> Plan<'a> {
         for (name, routine) in &routines.starts {
             functions.extend(along(&mut writer, name, ALONG, routine, begin));
         }
-        if let Some(mode) = &self.mode {
+        if self.mode.is_some() {
             functions.extend(along(&mut writer, "ha_open_along", ALONG, &routines.open, begin));
-            if mode.ratios.is_some() {
-                functions.extend(along(&mut writer, "ha_ratios_along", ALONG, &routines.ratios, begin));
-            }
+        }
+        if self.ratios().is_some() {
+            functions.extend(along(&mut writer, "ha_ratios_along", ALONG, &routines.ratios, begin));
         }
         functions.extend(along(&mut writer, "ha_impulses_along", ALONG, &routines.impulses, begin));
         functions.extend(along(&mut writer, "ha_positions_along", ALONG, &routines.positions, begin));
@@ -318,6 +326,7 @@ impl<'a> Plan<'a> {
             directional: work(&routines.rates).along(),
             clock: work(&routines.clock).along(),
             round: self.round(&routines),
+            watched: self.watching(&routines),
         };
         self.newton = used.clone();
         self.find_sizes(&writer);
@@ -350,9 +359,30 @@ impl<'a> Plan<'a> {
         };
     }
 
+    /// How fast variables move against those that are independent: of a mode, or of the equations that code keeps.
+    pub fn ratios(&self) -> Option<&Ratios> {
+        self.mode.as_ref().and_then(|mode| mode.ratios.as_ref()).or(self.watched.as_ref())
+    }
+
+    /// Whether a position may be passed at which the independent variables do not tell the motion.
+    pub fn may_pass(&self) -> bool {
+        self.watched.is_some() || self.mode.as_ref().is_some_and(|mode| mode.modes.exchanged() > 0)
+    }
+
     /// The functions of the equations.
     pub fn functions(&self) -> &[Function] {
         &self.functions
+    }
+
+    /// What it takes to look whether the independent variables tell the motion.
+    fn watching(&self, routines: &Routines) -> OperationCount {
+        let work = |routine: &Routine| OperationCount::of(self.program, &routine.code);
+        let Some(ratios) = &self.watched else { return OperationCount::default() };
+        let (n, m) = (ratios.independent.len() as u64, ratios.dependent.len() as u64);
+        let mut all = work(&routines.pivots) + work(&routines.ratios).along() * n;
+        all.operations += n * n * n + 4 * n * m * (n + 1) + 4 * ratios.pivots.len() as u64;
+        all.divisions += n + n * m;
+        all
     }
 
     /// What a round of what happens at events takes at most.

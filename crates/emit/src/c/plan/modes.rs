@@ -214,14 +214,9 @@ impl ModeTables<'_> {
         directions: &[usize; 6],
         list: &dyn Fn(Vec<String>) -> String,
     ) -> Vec<(&'static str, String)> {
-        let [_, _, conserved, states, ..] = *directions;
         let open = self.open(program, directions);
         let place = |symbol: &Symbol| self.modes.exchanged.binary_search(symbol).expect("it may be independent");
         let ratios = self.ratios.as_ref();
-        let told = |told: Told| match told {
-            Told::State(k) => states + k as usize,
-            Told::Conserved(k) => conserved + k as usize,
-        };
         let independent = ratios.map_or(&[][..], |r| &r.independent);
         let dependent = ratios.map_or(&[][..], |r| &r.dependent);
         let all = || independent.iter().map(|k| k.0).chain(dependent.iter().map(|o| o.0));
@@ -230,12 +225,7 @@ impl ModeTables<'_> {
             ("OPEN", open.len().to_string()),
             ("OPEN_PLACES", numbers(&mut open.iter().map(|o| o.0))),
             ("OPEN_SYMBOLS", numbers(&mut open.iter().map(|o| o.1))),
-            ("INDEPENDENT", independent.len().to_string()),
-            ("DEPENDENT", dependent.len().to_string()),
-            ("TOLD", numbers(&mut independent.iter().map(|k| told(k.2)))),
             ("RATIO_SYMBOLS", numbers(&mut all().map(|e| place(&e.symbol)))),
-            ("RATIO_WEIGHTS", list(all().map(|e| Real::Double.number(e.weighs())).collect())),
-            ("PIVOTS", ratios.map_or(0, |r| r.pivots.len()).to_string()),
         ]
     }
 
@@ -324,6 +314,30 @@ impl ModeTables<'_> {
             ("CONDITIONS", program.conditions.len().to_string()),
         ]
     }
+}
+
+/// Words of ratios between variables that could be independent and those that are.
+pub(super) fn words_of_ratios(
+    ratios: Option<&Ratios>,
+    directions: &[usize; 6],
+    real: Real,
+    list: &dyn Fn(Vec<String>) -> String,
+) -> [(&'static str, String); 5] {
+    let [_, _, conserved, states, ..] = *directions;
+    let told = |told: Told| match told {
+        Told::State(k) => states + k as usize,
+        Told::Conserved(k) => conserved + k as usize,
+    };
+    let independent = ratios.map_or(&[][..], |r| &r.independent);
+    let dependent = ratios.map_or(&[][..], |r| &r.dependent);
+    let all = independent.iter().map(|k| k.0).chain(dependent.iter().map(|o| o.0));
+    [
+        ("INDEPENDENT", independent.len().to_string()),
+        ("DEPENDENT", dependent.len().to_string()),
+        ("TOLD", list(independent.iter().map(|k| told(k.2).to_string()).collect())),
+        ("RATIO_WEIGHTS", list(all.map(|e| real.number(e.weighs())).collect())),
+        ("PIVOTS", ratios.map_or(0, |r| r.pivots.len()).to_string()),
+    ]
 }
 
 /// What is zero of margins and impulses: see `halfarrow_exec::model::{margins, impulses}`.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use halfarrow_compiler::program::{
-    Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, RatesInParts, Routine, Solve, Value,
+    Arg, BlockId, Clause, Code, ConditionId, Jumps, Method, RatesInParts, Ratios, Routine, Solve, Value,
 };
 
 use super::{ModeTables, Plan};
@@ -116,8 +116,8 @@ impl Routines {
         let of_bounds = |values: &dyn Fn(&ModeTables) -> Vec<Value>| p.routine(&bounds.map_or_else(Vec::new, values));
         Routines {
             open: of_bounds(&|b| b.open(p, &[0; 6]).into_iter().map(|o| o.2).collect()),
-            ratios: of_bounds(&|b| b.ratios.iter().flat_map(|r| r.values()).collect()),
-            pivots: of_bounds(&|b| b.ratios.iter().flat_map(|r| r.pivots.iter().copied()).collect()),
+            ratios: p.routine(&plan.ratios().map_or_else(Vec::new, Ratios::values)),
+            pivots: p.routine(&plan.ratios().map_or_else(Vec::new, |ratios| ratios.pivots.clone())),
             margins: of_bounds(&|b| b.bounds.values()),
             compared: of_bounds(&|b| b.bounds.compared.concat()),
             carried: p.routine(&wanted),

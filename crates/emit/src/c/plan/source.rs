@@ -103,6 +103,7 @@ impl Plan<'_> {
         if !self.program.clauses.is_empty() || self.program.jumps.is_some() {
             put(filling.fragments(EVENTS));
         }
+        put(filling.fragments(include_str!("../runtime/ratios.c")));
         put(filling.fragments(include_str!("../runtime/enter.c")));
         put(filling.fragments(include_str!("../runtime/cross.c")));
         if self.export.method.is_implicit() {
@@ -201,7 +202,9 @@ impl Plan<'_> {
             moves: !p.clauses.is_empty() || mode.is_some(),
             modes: mode.is_some(),
             exchanges: mode.is_some_and(|mode| mode.modes.exchanged() > 0),
-            ratios: mode.is_some_and(|mode| mode.ratios.is_some()),
+            ratios: self.ratios().is_some(),
+            watches: self.watched.is_some(),
+            may_pass: self.may_pass(),
             bounds: bounds.is_some(),
             gaps: bounds.is_some_and(ModeTables::has_gaps),
             meets: bounds.is_some_and(ModeTables::meets),

@@ -152,6 +152,7 @@ impl Plan<'_> {
             own.into_iter().chain(exchanges).chain(bounds.modes.words()).chain(super::modes::tolerances(real))
         });
         let more = linearly_implicit(self.export.method, real);
+        let ratios = super::modes::words_of_ratios(self.ratios(), &self.sizes.directions, real, &join);
         let tables = [
             ("TABLES", Written::of(self.tables())),
             ("BLOCK_TABLE", self.block_table()),
@@ -164,6 +165,7 @@ impl Plan<'_> {
             .chain(events)
             .chain(order)
             .chain(bounds)
+            .chain(ratios)
             .chain(more)
             .chain(tolerances(real))
             .map(|(word, text)| (word, Written::of(text)))

@@ -76,7 +76,7 @@ impl Plan<'_> {
                 all
             }
         };
-        step = step + w.switching.clone() + w.observe.clone() + w.ahead.clone();
+        step = step + w.switching.clone() + w.observe.clone() + w.ahead.clone() + w.watched.clone();
         let follows = |blocks: &[BlockId], work: &OperationCount| {
             if blocks.is_empty() { OperationCount::default() } else { work.clone() }
         };

@@ -24,6 +24,10 @@ static int ha_cross_begin(ha_model *m, double t, $real *x)
     }
 //end
     m->crossed = t;
+//if ratios
+    /* Positions may be others after it. */
+    m->steepest_known = 0;
+//end
 //if looks_ahead
     $ha_forget_ahead(m);
 //end

@@ -151,6 +151,7 @@ static int ha_enter(ha_model *m, double t, $real *x, $real *leap)
     m->failure.code = $MODEL_OK;
 //if exchanges
     m->pivots_known = 0;
+    m->steepest_known = 0;
 //end
     $ha_fill(m->floors, $0.0, $CONDITIONS);
     status = $ha_parameters(m);
@@ -261,6 +262,7 @@ static int ha_enter_at(ha_model *m, double t, $real *x)
     int status;
     m->failure.code = $MODEL_OK;
     m->pivots_known = 0;
+    m->steepest_known = 0;
 //if bounds
     $ha_fill(m->floors, $0.0, $CONDITIONS);
 //end
@@ -289,87 +291,6 @@ static int ha_enter_at(ha_model *m, double t, $real *x)
 }
 
 //if ratios
-//item ha_is_pivot_smaller
-/* Whether something that ratios are divided by is smaller than when they were last looked at, or has changed its sign. */
-static int ha_is_pivot_smaller(ha_model *m, double t, const $real *x)
-{
-    $real now[$PIVOTS + 1];
-    int smaller = !m->pivots_known;
-    int i;
-//if held
-    $ha_place(m, t);
-//end
-    if ($ha_pivots_code(m, t, x, now) != $MODEL_OK) {
-        m->failure.code = $MODEL_OK;
-        return 1;
-    }
-    for (i = 0; i < $PIVOTS && !smaller; ++i) {
-        const $real part = now[i] / m->pivots[i];
-        smaller = part != part || part <= $0.95;
-    }
-    if (smaller) {
-        $ha_copy(m->pivots, now, $PIVOTS);
-        m->pivots_known = 1;
-    }
-    return smaller;
-}
-
-//item ha_find_ratios
-/* How the dependent variables move with the independent ones, a row for each, all in their weights; whether that has values. */
-static int ha_find_ratios(ha_model *m, double t, const $real *x, $real *ratios)
-{
-    static const int told[] = {$TOLD};
-    static const $real weights[] = {$RATIO_WEIGHTS};
-    $real out[$INDEPENDENT + $DEPENDENT];
-    $real rates[$INDEPENDENT + $DEPENDENT];
-    $real matrix[$INDEPENDENT * $INDEPENDENT];
-    $real right[$INDEPENDENT * $DEPENDENT];
-    int row;
-    int k;
-    for (k = 0; k < $INDEPENDENT; ++k) {
-        $ha_fill(m->along, $0.0, HA_DIRECTION);
-        m->along[told[k]] = $1.0;
-//if held
-        $ha_place(m, t);
-//end
-        if ($ha_ratios_along(m, t, x, m->along, out, rates) != $MODEL_OK) {
-            return 0;
-        }
-        for (row = 0; row < $INDEPENDENT; ++row) {
-            matrix[k * $INDEPENDENT + row] = rates[row];
-        }
-        for (row = 0; row < $DEPENDENT; ++row) {
-            right[k * $DEPENDENT + row] = rates[$INDEPENDENT + row];
-        }
-    }
-    if (!$ha_solve_square(matrix, right, $INDEPENDENT, $DEPENDENT)) {
-        return 0;
-    }
-    for (row = 0; row < $DEPENDENT; ++row) {
-        for (k = 0; k < $INDEPENDENT; ++k) {
-            const $real part = weights[$INDEPENDENT + row] / weights[k];
-            ratios[row * $INDEPENDENT + k] = right[k * $DEPENDENT + row] * part;
-        }
-    }
-    return $ha_all_finite(ratios, $INDEPENDENT * $DEPENDENT);
-}
-
-//item ha_greatest_ratio
-/* The greatest ratio, and its place. */
-static $real ha_greatest_ratio(const $real *ratios, int *place)
-{
-    $real most = $0.0;
-    int i;
-    *place = 0;
-    for (i = 0; i < $INDEPENDENT * $DEPENDENT; ++i) {
-        if ($fabs(ratios[i]) > most) {
-            most = $fabs(ratios[i]);
-            *place = i;
-        }
-    }
-    return most;
-}
-
 //item ha_exchange_ratios
 /* The variables of a row and a column change places. */
 static void ha_exchange_ratios($real *ratios, int row, int column)
@@ -394,8 +315,9 @@ static void ha_exchange_ratios($real *ratios, int row, int column)
 
 //end
 //entry ha_find_wanted
-/* Which variables should be independent instead of those that are; whether any should. A step from here has failed, or not. */
-static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, unsigned char *wanted)
+/* Which variables should be independent instead of those that are; whether any should. A step from here has failed, or not. passed is
+ * less than 0 where a position has been passed at which these do not tell the motion. */
+static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, unsigned char *wanted, int *passed)
 {
 //if ratios
     static const int symbols[] = {$RATIO_SYMBOLS};
@@ -405,14 +327,11 @@ static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, uns
     int place;
     int turn;
     int i;
-    const int smaller = $ha_is_pivot_smaller(m, t, x);
-    if (!(failed || smaller) || !$ha_find_ratios(m, t, x, ratios)) {
-        m->failure.code = $MODEL_OK;
+    *passed = $ha_look_at_ratios(m, t, x, failed, ratios);
+    if (*passed <= 0) {
         return 0;
     }
-    if ($ha_greatest_ratio(ratios, &place) <= (failed ? $1.2 : $10.0)) {
-        return 0;
-    }
+    *passed = 0;
     for (i = 0; i < $INDEPENDENT; ++i) {
         inside[i] = symbols[i];
     }
@@ -444,6 +363,7 @@ static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, uns
     (void)x;
     (void)failed;
     (void)wanted;
+    *passed = 0;
     return 0;
 //end
 }

@@ -127,7 +127,12 @@ int $model_set_parameter($model *m, int parameter, double value);
  * exporter; for other parameters, inputs or times they are solved for here, or $MODEL_NO_START says that they were not. */
 int $model_start($model *m, double t);
 
+//if modes
+/* Begins a run at a time with these states, which are those of mode 0: a run that stands in another one is gone on from by a copy of
+ * the structure. */
+//else
 /* Begins a run at a time with these states. */
+//end
 int $model_start_from($model *m, double t, const $real *x);
 
 /* One step; jumps within it are met exactly. */

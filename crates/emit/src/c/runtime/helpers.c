@@ -90,7 +90,7 @@ static int ha_fail(ha_model *m, int code, int where, double t)
     return code;
 }
 
-//if exchanges
+//if may_pass
 //item ha_solve_square
 /* Solves n equations for several right sides, in place, by elimination with the greatest pivot of a column; whether all pivots are more
  * than rounding. */

@@ -393,9 +393,10 @@ static int ha_exchange(ha_model *m, double t, $real *x, int failed, int *exchang
     const int from = m->mode;
     int status;
     int to;
+    int passed;
     *exchanged = 0;
-    if (!$ha_find_wanted(m, t, x, failed, wanted)) {
-        return $MODEL_OK;
+    if (!$ha_find_wanted(m, t, x, failed, wanted, &passed)) {
+        return passed ? $ha_fail(m, $MODEL_PASSED, 0, t) : $MODEL_OK;
     }
     to = $ha_mode_with(m->mode, wanted);
     if (to < 0 || to == from) {
@@ -455,7 +456,11 @@ int $model_is_over($model *m, double t, const $real *x, int *over)
 //if exchanges
     if (status == $MODEL_OK && !*over) {
         unsigned char wanted[$EXCHANGED];
-        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted) && $ha_mode_with(m->mode, wanted) >= 0;
+        int passed;
+        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted, &passed) && $ha_mode_with(m->mode, wanted) >= 0;
+        if (passed) {
+            return $ha_fail(m, $MODEL_PASSED, 0, t);
+        }
         *over = m->exchange_due;
     }
 //end

@@ -462,6 +462,11 @@ int $model_step_until($model *m, double end)
             status = $model_go_on(m, m->t, m->x);
         }
 //end
+//if watches
+        if (status == $MODEL_OK) {
+            status = $ha_watch(m, m->t, m->x);
+        }
+//end
     }
     for (i = 0; i <= $MODEL_MOST_JUMPS && status == $MODEL_OK && m->t + slack < end; ++i) {
         const double jump = $model_next_jump(m, m->t);
@@ -479,6 +484,11 @@ int $model_step_until($model *m, double end)
 //if modes
         if (status == $MODEL_OK) {
             status = $model_go_on(m, m->t, m->x);
+        }
+//end
+//if watches
+        if (status == $MODEL_OK) {
+            status = $ha_watch(m, m->t, m->x);
         }
 //end
 //if derivatives

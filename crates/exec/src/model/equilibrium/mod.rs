@@ -14,7 +14,7 @@ mod tangent;
 pub(super) use point::exchanged;
 
 use super::{EquilibriumError, Model};
-use halfarrow_sim::{Events, Jacobian, System};
+use halfarrow_sim::{Events, Jacobian, StepEnd, System};
 use leaf::Leaf;
 use point::LinearisedPoint;
 use rest::Rest;
@@ -173,7 +173,7 @@ impl Model {
         }
         let (mut other, mut y) = (self.clone(), found.x.clone());
         other.run.pivots.clear();
-        if !other.exchange(t, &mut y, false).map_err(EquilibriumError::Failure)? {
+        if !other.exchange(t, &mut y, StepEnd::Controlled).map_err(EquilibriumError::Failure)? {
             return Ok(found);
         }
         let leaf = other.leaf(t, &y);

@@ -17,7 +17,7 @@ use super::Model;
 use crate::bytecode::Routine;
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::Holds;
-use halfarrow_sim::{Events, Failure, Jacobian, Sparsity, System};
+use halfarrow_sim::{Events, Failure, Jacobian, Sparsity, StepEnd, System};
 use std::sync::Arc;
 
 /// What a run may be differentiated by, by its number in the program.
@@ -383,8 +383,8 @@ impl Events for Varied<'_> {
         self.model.handle_varied(t, x, s)
     }
 
-    fn exchange_independent(&mut self, t: f64, y: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        if !self.model.exchange_independent(t, &mut y[..self.n], failed)? {
+    fn exchange_independent(&mut self, t: f64, y: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
+        if !self.model.exchange_independent(t, &mut y[..self.n], step)? {
             return Ok(false);
         }
         Err(Model::in_other_variables(t))

@@ -2,7 +2,7 @@
 
 use super::{Quantity, Variation};
 use crate::model::{Memory, Model};
-use halfarrow_sim::{Events, Failure, Sparsity, System};
+use halfarrow_sim::{Events, Failure, Sparsity, StepEnd, System};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -288,8 +288,8 @@ impl Events for Taped<'_> {
         }
     }
 
-    fn exchange_independent(&mut self, t: f64, x: &mut [f64], failed: bool) -> Result<bool, Failure> {
-        match self.model.exchange_independent(t, x, failed)? {
+    fn exchange_independent(&mut self, t: f64, x: &mut [f64], step: StepEnd) -> Result<bool, Failure> {
+        match self.model.exchange_independent(t, x, step)? {
             true => Err(Model::in_other_variables(t)),
             false => Ok(false),
         }
