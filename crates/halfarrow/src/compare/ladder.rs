@@ -39,27 +39,44 @@ pub(super) struct Rung {
 pub(super) struct Effort {
     /// The error that is asked for.
     pub error: f64,
-    /// A run that takes longer ends its ladder.
+    /// A run that takes longer ends its ladder; one that takes [`LONGEST`] times as long is given up.
     pub patience: Duration,
     /// When measuring this form ends.
     pub until: Option<Moment>,
 }
 
-/// The ladder of a form with a method, timed once. `go_on` is asked before every run.
+/// A run is given up after so many times the patience.
+pub(super) const LONGEST: u32 = 3;
+
+impl Effort {
+    /// When a run that begins now is given up.
+    pub fn run_until(&self) -> Option<Moment> {
+        let own = Moment::now() + LONGEST * self.patience;
+        Some(self.until.map_or(own, |until| until.min(own)))
+    }
+}
+
+/// The ladder of a form with a method, timed once, and whether a run of it was given up. `go_on` is asked before every run.
 pub(super) fn ladder(
     subject: &Subject,
     reference: &Reference,
     method: Method,
     effort: Effort,
     go_on: &mut dyn FnMut() -> bool,
-) -> Vec<Rung> {
-    let mut rungs: Vec<Rung> = Vec::new();
+) -> (Vec<Rung>, bool) {
+    let (mut rungs, mut given_up): (Vec<Rung>, bool) = (Vec::new(), false);
     for power in RTOLS {
         if !go_on() || is_over(effort.until) {
             break;
         }
-        let settings = Settings { method, rtol: ten_to(-power), to: reference.to, until: effort.until };
-        let Some(rung) = rung(subject, reference, settings) else { continue };
+        let settings = Settings { method, rtol: ten_to(-power), to: reference.to, until: effort.run_until() };
+        let Some(rung) = rung(subject, reference, settings) else {
+            given_up = is_over(settings.until);
+            if given_up {
+                break;
+            }
+            continue;
+        };
         let enough = rung.error <= BEYOND * effort.error && rungs.len() > 1;
         let slow = rung.single > effort.patience;
         rungs.push(rung);
@@ -67,7 +84,7 @@ pub(super) fn ladder(
             break;
         }
     }
-    rungs
+    (rungs, given_up)
 }
 
 /// One run of a ladder, timed once; `None` if it stops before its end.

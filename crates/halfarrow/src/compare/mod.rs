@@ -24,7 +24,7 @@ use crate::run::Run;
 use crate::verdict::Verdict;
 use forms::LEFT_OUT;
 pub use forms::{ComparedForms, SolvedBlocks};
-use ladder::{Effort, Rung, cost_at, error_of, ladder, order, rung, ten_to};
+use ladder::{Effort, LONGEST, Rung, cost_at, error_of, ladder, order, rung, ten_to};
 use reference::{Apart, POINTS, Reference};
 use subject::{Common, Settings, Subject, Variable, is_over};
 
@@ -295,7 +295,8 @@ impl<'m> ComparedForms<'m> {
         // What is integrated in another way confirms more.
         others.sort_by_key(|(_, subject)| subject.is_explicit());
         let minimal = self.subjects[0].as_ref().expect("without it there are no forms");
-        match Reference::new(minimal, &others, &motion(minimal), to, self.budget.part(REFERENCE)) {
+        let effort = Effort { until: self.budget.part(REFERENCE), ..self.effort() };
+        match Reference::new(minimal, &others, &motion(minimal), to, effort) {
             Ok(reference) => Ok(Some(reference)),
             Err(stopped) => match stopped.failure {
                 Failure::Interrupted { .. } => Ok(None),
@@ -304,16 +305,21 @@ impl<'m> ComparedForms<'m> {
         }
     }
 
+    /// How much is measured, without an end.
+    fn effort(&self) -> Effort {
+        let patience = Duration::from_secs_f64(self.compare.patience.clamp(1e-3, 1e6));
+        Effort { error: self.compare.error, patience, until: None }
+    }
+
     /// Rows with times, and whether something was cut short.
     fn rows_with_times(&mut self, reference: &Reference, progress: Progress) -> Result<(Vec<Row>, bool), Error> {
-        let patience = Duration::from_secs_f64(self.compare.patience.clamp(1e-3, 1e6));
-        let (error, count) = (self.compare.error, self.rows.len());
+        let (effort, count) = (self.effort(), self.rows.len());
         let mut forms: Vec<Measured> = Vec::with_capacity(count);
         let all = std::mem::take(&mut self.subjects).into_iter().zip(std::mem::take(&mut self.rows));
         for (i, (subject, row)) in all.enumerate() {
             let mut go_on = || progress(0.05 + 0.45 * i as f64 / count as f64, row.form.name());
             let until = self.budget.share(LADDERS, count - i);
-            let effort = Effort { error, patience, until };
+            let effort = Effort { until, ..effort };
             let mut measured = Measured { row: row.clone(), ..Measured::default() };
             if let Some(subject) = subject {
                 match self.stiff.as_ref().filter(|_| row.form == Form::Stiff) {
@@ -332,7 +338,7 @@ impl<'m> ComparedForms<'m> {
         progress(0.95, "agreement");
         let cut = forms.iter().any(|form| form.cut) || is_over(until);
         let finished = |(i, form): (usize, Measured)| {
-            form.finish(reference, Effort { error, patience, until: self.budget.share(1.0, count - i) })
+            form.finish(reference, Effort { until: self.budget.share(1.0, count - i), ..effort })
         };
         let mut rows: Vec<Row> = forms.into_iter().enumerate().map(finished).collect();
         relate(&mut rows);
@@ -357,12 +363,12 @@ impl<'m> ComparedForms<'m> {
             let run = Run { form: Form::Stiff, stiffness: Some(stiffness), ..self.run.clone() };
             let mut subject = self.common.subject(equations, &run)?;
             subject.compile();
-            let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to, until: effort.until };
+            let exact = Settings { method: Method::Radau, rtol: 1e-9, to: reference.to, until: effort.run_until() };
             let Some(error) = error_of(&subject, reference, exact) else { continue };
             let mut rungs: Vec<Rung> = Vec::new();
             for &(method, part) in &methods {
                 let rtol = (part * error).clamp(1e-11, 1e-3);
-                let settings = Settings { method, rtol, to: reference.to, until: effort.until };
+                let settings = Settings { method, rtol, to: reference.to, until: effort.run_until() };
                 if rungs.iter().all(|r| (r.method, r.rtol) != (method, settings.rtol))
                     && let Some(found) = rung(&subject, reference, settings)
                 {
@@ -400,7 +406,9 @@ fn climb<'m>(
     go_on: &mut dyn FnMut() -> bool,
 ) {
     for method in subject.methods() {
-        measured.rungs.extend(ladder(&subject, reference, method, effort, go_on).into_iter().map(|r| (r, 0)));
+        let (rungs, given_up) = ladder(&subject, reference, method, effort, go_on);
+        measured.rungs.extend(rungs.into_iter().map(|r| (r, 0)));
+        measured.given_up |= given_up;
     }
     measured.subjects.push(subject);
 }
@@ -428,6 +436,8 @@ struct Measured<'m> {
     row: Row,
     /// Whether the time was over before all was measured.
     cut: bool,
+    /// Whether a run took far longer than patience allows.
+    given_up: bool,
     rungs: Vec<(Rung, usize)>,
     subjects: Vec<Subject<'m>>,
 }
@@ -486,14 +496,19 @@ fn measure(forms: &mut [Measured], to: f64, repeats: usize, until: Option<Moment
 impl Measured<'_> {
     /// What follows from the runs.
     fn finish(self, reference: &Reference, effort: Effort) -> Row {
-        let Measured { mut row, cut, rungs, subjects } = self;
+        let Measured { mut row, cut, given_up, rungs, subjects } = self;
         let Some(last) = subjects.last() else {
             row.reason = row.reason.or(Some(STOPS.into()));
             return row;
         };
         row.take_operations(last);
         if rungs.is_empty() {
-            row.reason = Some(if cut { LEFT_OUT } else { STOPS }.into());
+            let long = (LONGEST * effort.patience).as_secs_f64();
+            row.reason = Some(match (cut, given_up) {
+                (true, _) => LEFT_OUT.into(),
+                (_, true) => format!("left out: a run takes more than {long} s (a longer --patience waits)"),
+                _ => STOPS.into(),
+            });
             return row;
         }
         let of = |method: Method| -> Vec<Rung> {
@@ -506,7 +521,8 @@ impl Measured<'_> {
         let chosen = best.as_ref().map_or(exactest.cloned(), |b| Some(b.1.clone()));
         if let Some(chosen) = &chosen {
             let subject = rungs.iter().find(|r| r.0 == *chosen).map_or(last, |r| &subjects[r.1]);
-            let settings = Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to, until: effort.until };
+            let settings =
+                Settings { method: chosen.method, rtol: chosen.rtol, to: reference.to, until: effort.run_until() };
             let audit = subject.audited(settings, chosen.stiffness);
             if let Some(miss) = audit.as_ref().and_then(|audit| audit.energy.as_ref()) {
                 (row.energy_error, row.energy_resolution) = (Some(miss.value), Some(miss.resolution));
@@ -521,20 +537,20 @@ impl Measured<'_> {
             }
             None => row.reason = chosen.map(|r| format!("no run comes nearer than {:.0e}", r.error)),
         }
-        agreement(&mut row, last, reference, effort.until);
+        agreement(&mut row, last, reference, effort);
         row.runs = rungs.iter().map(|r| timed(&r.0)).collect();
         row
     }
 }
 
 /// How far all variables are off at a tight tolerance.
-fn agreement(row: &mut Row, subject: &Subject, reference: &Reference, until: Option<Moment>) {
+fn agreement(row: &mut Row, subject: &Subject, reference: &Reference, effort: Effort) {
     let variables = subject.variables();
     let names = reference.common(&variables);
     let tried = [Method::Radau, Method::Auto].into_iter().take(if subject.methods().len() > 2 { 2 } else { 1 });
     let found: Vec<(Apart, f64)> = tried
         .filter_map(|method| {
-            let settings = Settings { method, rtol: TIGHT, to: reference.to, until };
+            let settings = Settings { method, rtol: TIGHT, to: reference.to, until: effort.run_until() };
             let trace = subject.sampled(settings, reference.to / POINTS, &names).ok()?;
             Some((reference.apart(&trace, false), reference.apart(&trace, true).value))
         })

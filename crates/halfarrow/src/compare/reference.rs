@@ -6,8 +6,8 @@ use halfarrow_compiler::equations::{Form, ObservedKind};
 use halfarrow_sim::{Method, Stopped};
 use halfarrow_trace::Trace;
 
+use super::ladder::Effort;
 use super::subject::{Settings, Subject, Variable, is_over};
-use crate::clock::Moment;
 
 /// Tolerance of the reference.
 const TIGHTEST: f64 = 1e-12;
@@ -42,30 +42,33 @@ pub(super) struct Apart {
 }
 
 impl Reference {
-    /// `others` are forms that may confirm it, the best first. `motion` are the variables that the motion is.
+    /// `others` are forms that may confirm it, the best first, in runs that are no longer than the effort allows. `motion`
+    /// are the variables that the motion is.
     pub(super) fn new(
         minimal: &Subject,
         others: &[(Form, &Subject)],
         motion: &[String],
         to: f64,
-        until: Option<Moment>,
+        effort: Effort,
     ) -> Result<Reference, Box<Stopped>> {
         let known = minimal.variables();
         let names: Vec<&str> = known.iter().map(|v| v.name.as_str()).collect();
-        let settings = |method| Settings { method, rtol: TIGHTEST, to, until };
-        let run = |subject: &Subject, method, names: &[&str]| {
-            subject.sampled(settings(method), to / POINTS, names).map_err(Box::new)
+        let run = |subject: &Subject, method, names: &[&str], until| {
+            let settings = Settings { method, rtol: TIGHTEST, to, until };
+            subject.sampled(settings, to / POINTS, names).map_err(Box::new)
         };
-        let auto = run(minimal, Method::Auto, &names);
-        let radau = run(minimal, Method::Radau, &names);
-        let confirming = others.iter().take_while(|_| !is_over(until)).find_map(|(form, subject)| {
+        let auto = run(minimal, Method::Auto, &names, effort.until);
+        // The second one of the same form need not come to its end.
+        let patient = if auto.is_ok() { effort.run_until() } else { effort.until };
+        let radau = run(minimal, Method::Radau, &names, patient);
+        let confirming = others.iter().take_while(|_| !is_over(effort.until)).find_map(|(form, subject)| {
             let theirs = subject.variables();
             let common: Vec<&str> = names
                 .iter()
                 .copied()
                 .filter(|n| motion.iter().any(|m| m == n) && theirs.iter().any(|v| v.name == *n))
                 .collect();
-            run(subject, Method::Radau, &common).ok().map(|trace| (*form, trace))
+            run(subject, Method::Radau, &common, effort.run_until()).ok().map(|trace| (*form, trace))
         });
         let candidates: Vec<(Method, Trace)> = match (auto, radau) {
             (Ok(auto), Ok(radau)) => vec![(Method::Auto, auto), (Method::Radau, radau)],
