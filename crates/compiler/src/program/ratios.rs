@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Exchanged, Program, Reads, Value};
+use super::{Exchanged, Program, Reads, Step, Value};
 use crate::algebra::Symbol;
 
 /// Variables that could change places.
@@ -14,7 +14,13 @@ pub struct Ratios {
     pub dependent: Vec<(Exchanged, Value)>,
     /// What ratios between them are divided by, where it varies.
     pub pivots: Vec<Value>,
+    /// Whether they are to be looked at whatever became of these: there are none, or ratios follow from equations that are solved
+    /// together, which may be singular, too, and are few.
+    pub always: bool,
 }
+
+/// Unknowns of solve blocks, times independent variables, up to which ratios are looked at after each step.
+const FEW: usize = 64;
 
 /// What tells an independent variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +53,16 @@ impl Program {
         let all = independent.len() == self.exchanges.independent.len();
         let pivots: BTreeSet<Value> = self.pivot_guards.iter().map(|guard| guard.pivot).collect();
         let varies = |pivot: &Value| self.values.reads(*pivot) != Reads::PARAMETERS;
-        let pivots = pivots.into_iter().filter(varies).collect();
-        (all && !independent.is_empty() && !dependent.is_empty()).then_some(Ratios { independent, dependent, pivots })
+        let pivots: Vec<Value> = pivots.into_iter().filter(varies).collect();
+        if !all || independent.is_empty() || dependent.is_empty() {
+            return None;
+        }
+        let mut ratios = Ratios { independent, dependent, pivots, always: false };
+        let code = self.routine(&ratios.values()).code;
+        let solved = |step: &Step| if let Step::Solve(solve) = step { solve.unknowns.len() } else { 0 };
+        let unknowns: usize = code.steps.iter().map(solved).sum();
+        let few = unknowns > 0 && unknowns * ratios.independent.len() <= FEW;
+        ratios.always = ratios.pivots.is_empty() || few;
+        Some(ratios)
     }
 }

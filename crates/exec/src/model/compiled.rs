@@ -152,7 +152,12 @@ impl Compiled {
             let program = self.fitting(alternatives.program(&key.branches, wanted, point).ok())?;
             let mut own: Vec<Symbol> = program.exchanges.independent.iter().map(|e| e.symbol).collect();
             own.sort_unstable();
-            (own == wanted).then_some(program)
+            // Where nothing that is divided by varies no others can be independent, nor are any told.
+            let exchanges = &present.program.exchanges;
+            let known = || exchanges.independent.iter().chain(&exchanges.dependent);
+            let told = |symbol: &Symbol| known().any(|e| e.symbol == *symbol && program.tracked.contains(&e.told_by));
+            let fits = own == wanted || own.is_empty() && wanted.iter().all(told);
+            fits.then_some(program)
         });
         self.added(key, made)
     }

@@ -52,6 +52,8 @@ pub(super) struct Ratios {
     routine: Routine,
     /// What ratios are divided by, where it varies.
     pub(super) pivots: Routine,
+    /// Whether they are looked at whatever became of that.
+    always: bool,
 }
 
 impl Ratios {
@@ -65,6 +67,7 @@ impl Ratios {
             registers: ratios.independent.iter().map(|k| register(k.2)).collect(),
             routine: layout.routine(program, &ratios.values()),
             pivots: layout.routine(program, &ratios.pivots),
+            always: ratios.always,
             independent: ratios.independent.into_iter().map(|k| k.0).collect(),
             dependent: ratios.dependent.into_iter().map(|o| o.0).collect(),
         })
@@ -192,7 +195,7 @@ impl Model {
         if !self.is_due(ratios, t, x, failed) {
             return;
         }
-        let steep = self.steepest(ratios, None, t, x).is_some_and(|(now, _)| now.value.abs() > most);
+        let steep = self.steepest(ratios, None, (t, x), true).is_some_and(|(now, _)| now.value.abs() > most);
         let outlived = steep && self.better(ratios, t, x, most).is_some();
         if let Some(variation) = &mut self.variation {
             variation.outlived = outlived;
@@ -203,11 +206,15 @@ impl Model {
         let code = self.code.clone();
         let Some(ratios) = code.exchanges.as_ref() else { return Ok(false) };
         let failed = step == StepEnd::Failed;
-        if !self.is_due(ratios, t, x, failed) {
+        let smaller = self.is_due(ratios, t, x, failed);
+        if !smaller && !ratios.always {
             return Ok(false);
         }
-        let before = self.run.steepest.take();
-        let Some((now, at_before)) = self.steepest(ratios, before, t, x) else { return Ok(false) };
+        let before = self.run.steepest;
+        let Some((now, at_before)) = self.steepest(ratios, before, (t, x), smaller) else {
+            self.run.steepest = before.filter(|_| !smaller);
+            return Ok(false);
+        };
         self.run.steepest = Some(now);
         if before.is_some_and(|before| before.is_passed(at_before)) {
             return Err(self.passed(ratios, t));
@@ -293,13 +300,14 @@ impl Model {
     }
 
     /// The greatest ratio of how variables move to how the independent ones do, and what it is now at the place where it was
-    /// greatest before; `None` where they have no value. Takes no memory where each independent variable is a state.
+    /// greatest before; `None` where they have no value. Takes no memory where each independent variable moves with a state of its
+    /// own; they are not looked at otherwise unless it `may`.
     fn steepest(
         &mut self,
         ratios: &Ratios,
         before: Option<Steepest>,
-        t: f64,
-        x: &[f64],
+        (t, x): (f64, &[f64]),
+        may: bool,
     ) -> Option<(Steepest, Option<f64>)> {
         let n = ratios.independent.len();
         let (mut most, mut at_before) = (Steepest { row: 0, column: 0, value: 0.0 }, None);
@@ -311,7 +319,7 @@ impl Model {
             let rate = |register: u32| self.frame.d[register as usize];
             // A momentum, or what is conserved, moves several of them: what follows from each is not seen from that alone.
             if own.iter().enumerate().any(|(i, &r)| i != column && rate(r) != 0.0) {
-                let table = self.table(ratios, t, x)?;
+                let table = if may { self.table(ratios, t, x)? } else { return None };
                 let value = |s: Steepest| table.ratios[s.row * n + s.column];
                 let (row, column, _) = table.greatest()?;
                 let most = Steepest { row, column, value: 0.0 };

@@ -322,7 +322,7 @@ pub(super) fn words_of_ratios(
     directions: &[usize; 6],
     real: Real,
     list: &dyn Fn(Vec<String>) -> String,
-) -> [(&'static str, String); 5] {
+) -> [(&'static str, String); 6] {
     let [_, _, conserved, states, ..] = *directions;
     let told = |told: Told| match told {
         Told::State(k) => states + k as usize,
@@ -337,6 +337,7 @@ pub(super) fn words_of_ratios(
         ("TOLD", list(independent.iter().map(|k| told(k.2).to_string()).collect())),
         ("RATIO_WEIGHTS", list(all.map(|e| real.number(e.weighs())).collect())),
         ("PIVOTS", ratios.map_or(0, |r| r.pivots.len()).to_string()),
+        ("ALWAYS", u8::from(ratios.is_some_and(|r| r.always)).to_string()),
     ]
 }
 

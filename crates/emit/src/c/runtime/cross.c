@@ -28,6 +28,9 @@ static int ha_cross_begin(ha_model *m, double t, $real *x)
     /* Positions may be others after it. */
     m->steepest_known = 0;
 //end
+//if watches
+    m->pivots_known = 0;
+//end
 //if looks_ahead
     $ha_forget_ahead(m);
 //end

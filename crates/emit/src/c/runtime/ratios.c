@@ -8,7 +8,7 @@
 static int ha_is_pivot_smaller(ha_model *m, double t, const $real *x)
 {
     $real now[$PIVOTS + 1];
-    int smaller = !m->pivots_known || $PIVOTS == 0;
+    int smaller = !m->pivots_known;
     int i;
 //if held
     $ha_place(m, t);
@@ -97,7 +97,7 @@ static int ha_look_at_ratios(ha_model *m, double t, const $real *x, int failed, 
     int grown;
     $real most;
     const int smaller = $ha_is_pivot_smaller(m, t, x);
-    if (!(failed || smaller)) {
+    if (!(failed || smaller || $ALWAYS)) {
         return 0;
     }
     m->steepest_known = 0;
@@ -125,12 +125,43 @@ static int ha_look_at_ratios(ha_model *m, double t, const $real *x, int failed, 
 
 //end
 //if watches
+//item ha_has_pivot_turned
+/* Whether something that ratios are divided by has changed its sign since the last step. */
+static int ha_has_pivot_turned(ha_model *m, double t, const $real *x)
+{
+    $real now[$PIVOTS + 1];
+    int turned = 0;
+    int i;
+//if held
+    $ha_place(m, t);
+//end
+    if ($ha_pivots_code(m, t, x, now) != $MODEL_OK) {
+        m->failure.code = $MODEL_OK;
+        return 0;
+    }
+    for (i = 0; i < $PIVOTS && m->pivots_known; ++i) {
+        turned = turned || now[i] / m->pivots[i] < $0.0;
+    }
+    $ha_copy(m->pivots, now, $PIVOTS);
+    m->pivots_known = 1;
+    return turned;
+}
+
 //entry ha_watch
-/* Stops where a position has been passed at which the independent variables do not tell the motion: there are no others here. */
+/* Stops where a position has been passed at which the independent variables do not tell the motion: there are no others here. Of many
+ * equations ratios are looked at only where what they are divided by has changed its sign. */
 static int ha_watch(ha_model *m, double t, const $real *x)
 {
     $real ratios[$INDEPENDENT * $DEPENDENT];
-    return $ha_look_at_ratios(m, t, x, 0, ratios) < 0 ? $ha_fail(m, $MODEL_PASSED, 0, t) : $MODEL_OK;
+    int place;
+    int passed = 0;
+    if ($ALWAYS) {
+        passed = $ha_look_at_ratios(m, t, x, 0, ratios) < 0;
+    } else if ($ha_has_pivot_turned(m, t, x)) {
+        passed = $ha_find_ratios(m, t, x, ratios) && $ha_greatest_ratio(ratios, &place) > $5.0;
+        m->failure.code = $MODEL_OK;
+    }
+    return passed ? $ha_fail(m, $MODEL_PASSED, 0, t) : $MODEL_OK;
 }
 
 //end
