@@ -349,7 +349,7 @@ fn modes(
     // is known in one of them.
     let one = export.real == Real::Float || export.target == Target::Casadi || export.project;
     let sets = if one { 0 } else { MOST_SETS };
-    let all = system.clone().programs_of_modes((0.0, &start.states), MOST_MODES, sets).ok_or_else(|| {
+    let all = system.programs_of_modes((0.0, &start.states), MOST_MODES, sets).ok_or_else(|| {
         let laws = model.graph.set_valued.len();
         let reason = format!(
             "{laws} set-valued laws have more than {MOST_MODES} combinations of branches: exported code knows each of them as \

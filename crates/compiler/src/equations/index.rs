@@ -109,7 +109,7 @@ fn promised_indices(
         let mut along = higher.clone();
         let reads = |along: &BTreeSet<Symbol>, e: &Expr| d.x.depends_on_any(*e, &|s| along.contains(&s));
         for step in steps {
-            if step.read().iter().any(|e| reads(&along, e)) {
+            if step.expressions().iter().any(|e| reads(&along, e)) {
                 along.extend(step.defined());
             }
         }
@@ -334,7 +334,7 @@ impl EquationStep {
     }
 
     /// All expressions that the step evaluates for what it defines.
-    fn read(&self) -> Vec<Expr> {
+    pub fn expressions(&self) -> Vec<Expr> {
         match self {
             EquationStep::Assign { value, .. } => vec![*value],
             EquationStep::Linear(block) => {

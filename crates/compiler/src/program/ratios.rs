@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::{Exchanged, Program, Reads, Step, Value};
+use super::{Exchanged, Program, Reads, Step, Value, first_of};
 use crate::algebra::Symbol;
 
 /// Variables that could change places.
@@ -35,6 +35,15 @@ impl Ratios {
     /// The values of those that are independent, then of the others.
     pub fn values(&self) -> Vec<Value> {
         self.independent.iter().map(|k| k.1).chain(self.dependent.iter().map(|o| o.1)).collect()
+    }
+
+    /// What tells those that are independent in a program, for messages.
+    pub fn tellers(&self, program: &Program) -> String {
+        let name = |told: Told| match told {
+            Told::State(k) => program.states[k as usize].name.as_str(),
+            Told::Conserved(k) => program.conserved[k as usize].as_str(),
+        };
+        first_of(&self.independent.iter().map(|k| name(k.2)).collect::<Vec<_>>().join(", "))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use halfarrow_compiler::program::{Assumption, Clause, DomainKind, LawDomain, PivotGuard, Told, first_of};
+use halfarrow_compiler::program::{Assumption, Clause, DomainKind, LawDomain, PivotGuard, first_of};
 
 use super::fragment::{Fragment, Kind};
 use super::plan::Plan;
@@ -197,17 +197,11 @@ fn domain(d: &LawDomain) -> String {
 
 /// That a position has been passed at which these variables do not tell the motion.
 fn passed(plan: &Plan) -> Vec<String> {
-    let program = plan.program;
-    let name = |told: Told| match told {
-        Told::State(k) => program.states[k as usize].name.clone(),
-        Told::Conserved(k) => program.conserved[k as usize].clone(),
-    };
-    let names: Vec<String> = plan.ratios().iter().flat_map(|r| &r.independent).map(|k| name(k.2)).collect();
     let remedy = match plan.mode {
         Some(_) => "make the step shorter; the table of modes may lack the variables that tell it there",
         None => "make the step shorter, or name others with `prefer`: here exported code keeps its own",
     };
-    let what = first_of(&names.join(", "));
+    let what = plan.ratios().map_or_else(String::new, |ratios| ratios.tellers(plan.program));
     vec![format!("the motion does not follow from {what} at a position that has been passed: {remedy}")]
 }
 

@@ -9,18 +9,17 @@ use super::system::What;
 use super::{Model, clauses::EventWork};
 use crate::bytecode::{Frame, Hold, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
-use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Told, Value, first_of};
+use halfarrow_compiler::program::{Block, Exchanged, Op, Program, Told, Value};
 use halfarrow_sim::{Failure, StepEnd};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Variables are exchanged where one moves so many times as fast as the one that stays independent,
 const FAR: f64 = 10.0;
-/// or where a step has failed and it moves so many times as fast,
-const AFTER_FAILURE: f64 = 1.2;
-/// or where it moves so many times as fast, and by so many times more than when that was looked at last: steps whose error nothing
-/// controls are long beside the way that is left to a singular position;
-const GROWING: f64 = 1.2;
+/// or so many times as fast where a step has failed, or where steps whose error nothing controls are long beside the way that is left
+/// to a singular position:
+const SOON: f64 = 1.2;
+/// the ratio has grown so many times since it was looked at last;
 const OUTGROWS: f64 = 1.1;
 /// and then until none moves so many times as fast.
 const NEAR: f64 = 1.1;
@@ -191,7 +190,7 @@ impl Model {
     fn outlive(&mut self, t: f64, x: &[f64], failed: bool) {
         let code = self.code.clone();
         let Some(ratios) = code.exchanges.as_ref().filter(|_| self.compiled.has_alternatives()) else { return };
-        let most = if failed { AFTER_FAILURE } else { FAR };
+        let most = if failed { SOON } else { FAR };
         if !self.is_due(ratios, t, x, failed) {
             return;
         }
@@ -217,11 +216,11 @@ impl Model {
         };
         self.run.steepest = Some(now);
         if before.is_some_and(|before| before.is_passed(at_before)) {
-            return Err(self.passed(ratios, t));
+            return Err(self.passed(t));
         }
         let most = match step {
-            StepEnd::Failed => AFTER_FAILURE,
-            StepEnd::Fixed if before.is_some_and(|before| now.outgrows(before)) => GROWING,
+            StepEnd::Failed => SOON,
+            StepEnd::Fixed if before.is_some_and(|before| now.outgrows(before)) => SOON,
             _ => FAR,
         };
         if now.value.abs() <= most || !self.compiled.has_alternatives() {
@@ -238,14 +237,10 @@ impl Model {
     }
 
     /// A position has been passed where the independent variables do not tell the motion: behind it the run has no meaning.
-    fn passed(&self, ratios: &Ratios, time: f64) -> Failure {
-        let (program, states) = (&self.code.program, self.code.layout.states);
-        let name = |&register: &u32| match register.checked_sub(states) {
-            Some(k) => program.states[k as usize].name.clone(),
-            None => program.conserved[(register - self.code.layout.conserved) as usize].clone(),
-        };
-        let names: Vec<String> = ratios.registers.iter().map(name).collect();
-        Failure::Singular { time, what: format!("what moves with {}", first_of(&names.join(", "))) }
+    fn passed(&self, time: f64) -> Failure {
+        let program = &self.code.program;
+        let tellers = program.ratios().map_or_else(String::new, |ratios| ratios.tellers(program));
+        Failure::Singular { time, what: format!("what moves with {tellers}") }
     }
 
     /// Goes on in a mode with the same position and motion; `false`, with nothing changed, if it cannot tell them.

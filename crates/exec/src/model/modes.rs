@@ -11,6 +11,7 @@ use crate::bytecode::Hold;
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{Clause, Exchanged, Margin, Program};
 use halfarrow_sim::Failure;
+use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Modes that are tried at one instant at most.
@@ -197,18 +198,11 @@ impl Model {
     /// The programs of all modes that a run from `(t, x)` may come to, the present one first: of each combination of branches
     /// that has equations and a value for all that is recorded, and with other independent variables where these may change
     /// and there are no more than `most_sets` choices of them. `None` if there are more than `most` combinations.
-    pub fn programs_of_modes(
-        &mut self,
-        (t, x): (f64, &[f64]),
-        most: usize,
-        most_sets: usize,
-    ) -> Option<Vec<ModeProgram>> {
+    pub fn programs_of_modes(&self, (t, x): (f64, &[f64]), most: usize, most_sets: usize) -> Option<Vec<ModeProgram>> {
         let all = self.combinations(most)?;
         let present: Vec<u32> = self.code.program.branches();
         let others = all.iter().filter(|branches| **branches != present);
-        // Models of one mode keep no place for all variables.
-        let changes = all.len() > 1 || self.code.exchanges.is_some();
-        let points = if changes { self.points_near(t, x) } else { Vec::new() };
+        let points = LazyCell::new(|| self.points_near(t, x));
         let mut modes = Vec::new();
         for branches in std::iter::once(&present).chain(others) {
             let Some(first) = self.compiled.in_mode(branches) else { continue };
@@ -239,13 +233,13 @@ impl Model {
 
     /// The variables of the graph at `(t, x)`, and at positions beside it: some choice of independent variables may be singular
     /// where a machine begins, as along an axis.
-    fn points_near(&mut self, t: f64, x: &[f64]) -> Vec<BTreeMap<Symbol, f64>> {
-        let scales = self.run.scales.clone();
+    fn points_near(&self, t: f64, x: &[f64]) -> Vec<BTreeMap<Symbol, f64>> {
+        let scales = &self.run.scales;
         let beside = |part: f64| {
             let moved = |(k, x): (usize, &f64)| {
                 let size = scales.get(k).copied().filter(|size| *size > 0.0).unwrap_or(1.0);
                 // No two states by the same.
-                x + part * size * (1.0 + UNEQUAL * k as f64).rem_euclid(1.0).max(UNEQUAL)
+                x + part * size * (1.0 + (UNEQUAL * k as f64).fract())
             };
             x.iter().enumerate().map(moved).collect::<Vec<f64>>()
         };

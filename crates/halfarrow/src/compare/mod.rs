@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use halfarrow_compiler::algebra::Expr;
 use halfarrow_compiler::bond_graph::ParameterKind;
-use halfarrow_compiler::equations::{EquationStep, Equations, Form, NewtonBlock, ObservedKind};
+use halfarrow_compiler::equations::{EquationStep, Equations, Form, ObservedKind};
 use halfarrow_sim::{Failure, Method};
 use serde::Serialize;
 
@@ -419,15 +419,7 @@ fn has_springs(equations: &Equations) -> bool {
     let mut parameters = equations.graph.parameters.values();
     let Some(spring) = parameters.find(|p| p.kind == ParameterKind::SpringStiffness) else { return false };
     let reads = |e: Expr| x.symbols_of(e).contains(&spring.symbol);
-    equations.steps.iter().any(|step| match step {
-        EquationStep::Assign { value, .. } => reads(*value),
-        EquationStep::Linear(block) => block.matrix.entries().iter().chain(&block.right).any(|&e| reads(e)),
-        EquationStep::Newton(block) => {
-            let NewtonBlock { body, residuals, .. } = &**block;
-            body.iter().map(|b| b.1).chain(residuals.iter().copied()).any(reads)
-        }
-        EquationStep::Guard { .. } => false,
-    })
+    equations.steps.iter().flat_map(EquationStep::expressions).any(reads)
 }
 
 /// A form with its runs; `stiff` has a subject for each stiffness.

@@ -315,9 +315,9 @@ static void ha_exchange_ratios($real *ratios, int row, int column)
 
 //end
 //entry ha_find_wanted
-/* Which variables should be independent instead of those that are; whether any should. A step from here has failed, or not. passed is
- * less than 0 where a position has been passed at which these do not tell the motion. */
-static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, unsigned char *wanted, int *passed)
+/* Which variables should be independent instead of those that are: 1 if any should, 0 if not, -1 where a position has been passed at
+ * which these do not tell the motion. A step from here has failed, or not. */
+static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, unsigned char *wanted)
 {
 //if ratios
     static const int symbols[] = {$RATIO_SYMBOLS};
@@ -327,11 +327,10 @@ static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, uns
     int place;
     int turn;
     int i;
-    *passed = $ha_look_at_ratios(m, t, x, failed, ratios);
-    if (*passed <= 0) {
-        return 0;
+    const int due = $ha_look_at_ratios(m, t, x, failed, ratios);
+    if (due <= 0) {
+        return due;
     }
-    *passed = 0;
     for (i = 0; i < $INDEPENDENT; ++i) {
         inside[i] = symbols[i];
     }
@@ -363,7 +362,6 @@ static int ha_find_wanted(ha_model *m, double t, const $real *x, int failed, uns
     (void)x;
     (void)failed;
     (void)wanted;
-    *passed = 0;
     return 0;
 //end
 }

@@ -391,12 +391,12 @@ static int ha_exchange(ha_model *m, double t, $real *x, int failed, int *exchang
 {
     unsigned char wanted[$EXCHANGED];
     const int from = m->mode;
+    const int found = $ha_find_wanted(m, t, x, failed, wanted);
     int status;
     int to;
-    int passed;
     *exchanged = 0;
-    if (!$ha_find_wanted(m, t, x, failed, wanted, &passed)) {
-        return passed ? $ha_fail(m, $MODEL_PASSED, 0, t) : $MODEL_OK;
+    if (found <= 0) {
+        return found < 0 ? $ha_fail(m, $MODEL_PASSED, 0, t) : $MODEL_OK;
     }
     to = $ha_mode_with(m->mode, wanted);
     if (to < 0 || to == from) {
@@ -456,11 +456,11 @@ int $model_is_over($model *m, double t, const $real *x, int *over)
 //if exchanges
     if (status == $MODEL_OK && !*over) {
         unsigned char wanted[$EXCHANGED];
-        int passed;
-        m->exchange_due = $ha_find_wanted(m, t, x, 0, wanted, &passed) && $ha_mode_with(m->mode, wanted) >= 0;
-        if (passed) {
+        const int found = $ha_find_wanted(m, t, x, 0, wanted);
+        if (found < 0) {
             return $ha_fail(m, $MODEL_PASSED, 0, t);
         }
+        m->exchange_due = found && $ha_mode_with(m->mode, wanted) >= 0;
         *over = m->exchange_due;
     }
 //end

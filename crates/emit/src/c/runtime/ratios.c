@@ -3,12 +3,13 @@
 //section
 /* ---- how fast variables move against those that are independent ---- */
 
-//item ha_is_pivot_smaller
-/* Whether something that ratios are divided by is smaller than when they were last looked at, or has changed its sign. */
-static int ha_is_pivot_smaller(ha_model *m, double t, const $real *x)
+//item ha_pivots_come_to
+/* Whether something that ratios are divided by has come to less than this part of what it was when it was last looked at, or that is not
+ * known. */
+static int ha_pivots_come_to(ha_model *m, double t, const $real *x, $real least)
 {
     $real now[$PIVOTS + 1];
-    int smaller = !m->pivots_known;
+    int come = !m->pivots_known;
     int i;
 //if held
     $ha_place(m, t);
@@ -17,15 +18,15 @@ static int ha_is_pivot_smaller(ha_model *m, double t, const $real *x)
         m->failure.code = $MODEL_OK;
         return 1;
     }
-    for (i = 0; i < $PIVOTS && m->pivots_known; ++i) {
+    for (i = 0; i < $PIVOTS && !come; ++i) {
         const $real part = now[i] / m->pivots[i];
-        smaller = smaller || part != part || part <= $0.95;
+        come = part != part || part <= least;
     }
-    if (smaller) {
+    if (come) {
         $ha_copy(m->pivots, now, $PIVOTS);
         m->pivots_known = 1;
     }
-    return smaller;
+    return come;
 }
 
 //item ha_find_ratios
@@ -96,7 +97,7 @@ static int ha_look_at_ratios(ha_model *m, double t, const $real *x, int failed, 
     int passed;
     int grown;
     $real most;
-    const int smaller = $ha_is_pivot_smaller(m, t, x);
+    const int smaller = $ha_pivots_come_to(m, t, x, $0.95);
     if (!(failed || smaller || $ALWAYS)) {
         return 0;
     }
@@ -125,39 +126,18 @@ static int ha_look_at_ratios(ha_model *m, double t, const $real *x, int failed, 
 
 //end
 //if watches
-//item ha_has_pivot_turned
-/* Whether something that ratios are divided by has changed its sign since the last step. */
-static int ha_has_pivot_turned(ha_model *m, double t, const $real *x)
-{
-    $real now[$PIVOTS + 1];
-    int turned = 0;
-    int i;
-//if held
-    $ha_place(m, t);
-//end
-    if ($ha_pivots_code(m, t, x, now) != $MODEL_OK) {
-        m->failure.code = $MODEL_OK;
-        return 0;
-    }
-    for (i = 0; i < $PIVOTS && m->pivots_known; ++i) {
-        turned = turned || now[i] / m->pivots[i] < $0.0;
-    }
-    $ha_copy(m->pivots, now, $PIVOTS);
-    m->pivots_known = 1;
-    return turned;
-}
-
 //entry ha_watch
 /* Stops where a position has been passed at which the independent variables do not tell the motion: there are no others here. Of many
  * equations ratios are looked at only where what they are divided by has changed its sign. */
 static int ha_watch(ha_model *m, double t, const $real *x)
 {
     $real ratios[$INDEPENDENT * $DEPENDENT];
+    const int known = m->pivots_known;
     int place;
     int passed = 0;
     if ($ALWAYS) {
         passed = $ha_look_at_ratios(m, t, x, 0, ratios) < 0;
-    } else if ($ha_has_pivot_turned(m, t, x)) {
+    } else if ($ha_pivots_come_to(m, t, x, $0.0) && known) {
         passed = $ha_find_ratios(m, t, x, ratios) && $ha_greatest_ratio(ratios, &place) > $5.0;
         m->failure.code = $MODEL_OK;
     }
