@@ -431,10 +431,11 @@ fn of_kept_steps(list: &mut List, plan: &Plan) {
         list.arrays(Kind::Real, &["rates_room"], beside.size(), "the same at any state");
         list.one(Kind::Int, &["common_known"], "whether that is known");
     }
-    if plan.groups_a_step().is_some() {
+    if plan.steps_to_find().is_some() {
         list.arrays(Kind::Real, &["next_jacobian"], nonzeros, "the Jacobian that is to follow");
         list.arrays(Kind::Real, &["next_at"], nx, "the state at which it is found");
-        list.one(Kind::Int, &["next_groups"], "groups of its columns that are to be found yet");
+        list.one(Kind::Int, &["next_steps"], "steps that find columns of it yet");
+        list.one(Kind::Int, &["next_waits"], "whether the last one has left that to the next one");
     }
     list.one(Kind::Wide, &["before_end", "last_end"], "where they ended, and their lengths");
     list.one(Kind::Real, &["before_length", "last_length"], "");

@@ -11,8 +11,8 @@
 //! much that steps would swing up. That is looked at every [`STEPS_A_LOOK`] steps, after an event, and where a step goes far from
 //! where it was expected, which then is made from there anew. All columns are found at one state: of different states they would
 //! lead a machine that moves in a plane out of it, and a stiff direction that turns would be another one in each.
-//! Of large systems some columns are found at each of the following steps, so that none of these is a long one; at once only where
-//! the step would go elsewhere.
+//! Of large systems some columns are found at each of the following steps, so that none of these is a long one, at the next one where
+//! a step has more to do than to go on; at once only where the step would go elsewhere.
 //! Systems whose derivatives take long have it by [differences](System::compares_rates) of their rates: one evaluation more,
 //! by code that has just run.
 
@@ -30,9 +30,10 @@ const LONGEST: f64 = 20.0;
 const GROUPS_A_STEP: usize = 3;
 const STEPS_TO_FIND: usize = 16;
 
-/// How many of so many groups of columns a step finds while the Jacobian is found anew; none where it finds all.
-fn groups_a_step(groups: usize) -> Option<usize> {
-    (groups > GROUPS_A_STEP).then(|| GROUPS_A_STEP.max(groups.div_ceil(STEPS_TO_FIND)))
+/// The number of steps in which so many groups of columns are found; none where one finds all. Each takes neighbours, which are computed
+/// by the same code.
+fn steps_to_find(groups: usize) -> Option<usize> {
+    (groups > GROUPS_A_STEP).then(|| groups.div_ceil(GROUPS_A_STEP).min(STEPS_TO_FIND))
 }
 
 /// A step is doubted whose move is another one than that before by so many times that, and by this part of a state.
@@ -76,8 +77,10 @@ pub struct History {
 /// A Jacobian of which some columns are found at each step, all at one state.
 #[derive(Clone, Debug, PartialEq)]
 struct Next {
-    /// Groups of columns that are to be found yet; 0 where none is wanted.
-    groups: usize,
+    /// Steps that find columns yet; 0 where none is wanted.
+    steps: usize,
+    /// Whether the last step has left that to the present one.
+    waits: bool,
     at: Vec<f64>,
     jacobian: Vec<f64>,
 }
@@ -134,7 +137,7 @@ impl LinearlyImplicitBdf2 {
     pub(super) fn new(sparsity: &Sparsity) -> LinearlyImplicitBdf2 {
         let states = sparsity.states();
         let (before, last) = (Step::none(states), Step::none(states));
-        let next = Next { groups: 0, at: vec![0.0; states], jacobian: vec![0.0; sparsity.nonzeros()] };
+        let next = Next { steps: 0, waits: false, at: vec![0.0; states], jacobian: vec![0.0; sparsity.nonzeros()] };
         let jacobian = Vec::with_capacity(sparsity.nonzeros());
         LinearlyImplicitBdf2 {
             history: History { before, last, jacobian, next, scale: f64::NAN, steps: 0, event: false },
@@ -193,10 +196,12 @@ impl LinearlyImplicitBdf2 {
         Ok(())
     }
 
-    /// Finds the Jacobian where a run begins, so that the first step does not. Where there are no rates, that step tells.
+    /// Finds the Jacobian where a run begins, and factors it, so that the first step does not. Where there are no rates, or no factors,
+    /// that step tells.
     pub(super) fn prepare(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
         if system.rates(t, x, &mut self.history.last.rates).is_ok() {
             self.renew(system, (t, h), x, false);
+            let _ = self.factor(system, t, h);
         }
     }
 
@@ -220,15 +225,18 @@ impl LinearlyImplicitBdf2 {
     fn renew(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64], goes_on: bool) {
         let event = std::mem::take(&mut self.history.event);
         self.history.steps += u32::from(goes_on);
-        let History { jacobian, steps, next, .. } = &self.history;
-        let follows = next.groups > 0;
+        let History { jacobian, steps, next, before, .. } = &mut self.history;
+        let follows = next.steps > 0;
+        let looks = event || (!follows && *steps >= STEPS_A_LOOK);
+        next.waits = follows && !next.waits && (looks || !before.ends_at(t));
+        let finds = follows && !next.waits;
         if jacobian.is_empty() {
             self.find_all(system, (t, h), x);
-        } else if event || (!follows && *steps >= STEPS_A_LOOK) {
+        } else if looks {
             self.history.steps = 0;
             self.look(system, (t, h), x);
         }
-        if follows {
+        if finds {
             self.find_some(system, (t, h));
         }
     }
@@ -237,7 +245,7 @@ impl LinearlyImplicitBdf2 {
     fn look(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) -> bool {
         match self.change(system, (t, h), x) {
             Change::Little => return false,
-            Change::Some if groups_a_step(self.groups.len()).is_some() => {
+            Change::Some if steps_to_find(self.groups.len()).is_some() => {
                 self.want_next(x);
                 return false;
             }
@@ -250,7 +258,7 @@ impl LinearlyImplicitBdf2 {
     fn find_all(&mut self, system: &mut dyn System, (t, h): (f64, f64), x: &[f64]) {
         let History { jacobian, last, scale, steps, next, .. } = &mut self.history;
         jacobian.resize(self.sparsity.nonzeros(), 0.0);
-        (*scale, *steps, next.groups) = (f64::NAN, 0, 0);
+        (*scale, *steps, next.steps) = (f64::NAN, 0, 0);
         self.at.copy_from_slice(x);
         self.rates_at.copy_from_slice(&last.rates);
         let mut values = std::mem::take(jacobian);
@@ -264,8 +272,8 @@ impl LinearlyImplicitBdf2 {
     /// From now on a Jacobian at this state is found, unless one is.
     fn want_next(&mut self, x: &[f64]) {
         let next = &mut self.history.next;
-        if next.groups == 0 {
-            next.groups = self.groups.len();
+        if next.steps == 0 {
+            next.steps = steps_to_find(self.groups.len()).unwrap_or(1);
             next.at.copy_from_slice(x);
         }
     }
@@ -273,19 +281,20 @@ impl LinearlyImplicitBdf2 {
     /// Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole.
     fn find_some(&mut self, system: &mut dyn System, (t, h): (f64, f64)) {
         let next = &mut self.history.next;
-        let (left, all) = (next.groups, self.groups.len());
+        let (left, all) = (next.steps, steps_to_find(self.groups.len()).unwrap_or(1));
         if left == 0 {
             return;
         }
-        let now = groups_a_step(all).unwrap_or(all).min(left);
         self.at.copy_from_slice(&next.at);
         let mut values = std::mem::take(&mut next.jacobian);
         let begun = !system.compares_rates() || system.rates(t, &self.at, &mut self.rates_at).is_ok();
-        let found = begun && (all - left..all - left + now).all(|group| self.find(system, (t, h), group, &mut values));
+        let end_of = |step: usize| (step * self.groups.len()).div_ceil(all);
+        let found = begun
+            && (end_of(all - left)..end_of(all - left + 1)).all(|group| self.find(system, (t, h), group, &mut values));
         let History { jacobian, next, scale, steps, .. } = &mut self.history;
         next.jacobian = values;
-        next.groups = if found { left - now } else { 0 };
-        if found && next.groups == 0 {
+        next.steps = if found { left - 1 } else { 0 };
+        if found && next.steps == 0 {
             std::mem::swap(jacobian, &mut next.jacobian);
             (*scale, *steps) = (f64::NAN, 0);
         }

@@ -419,10 +419,10 @@ impl<'a> Plan<'a> {
         self.export.method.keeps_steps() && self.program.is_long()
     }
 
-    /// How many groups of columns of a new Jacobian a step finds, as `halfarrow_sim::fixed_step` does; none where it finds all.
-    pub fn groups_a_step(&self) -> Option<usize> {
+    /// The number of steps in which the columns of a new Jacobian are found, as by `halfarrow_sim::fixed_step`; none where one finds all.
+    pub fn steps_to_find(&self) -> Option<usize> {
         let groups = if self.export.method.keeps_steps() { self.column_groups().len() } else { 0 };
-        (groups > 3).then(|| groups.div_ceil(16).max(3))
+        (groups > 3).then(|| groups.div_ceil(3).min(16))
     }
 }
 

@@ -190,7 +190,7 @@ impl Plan<'_> {
             time_derivative,
             keeps_steps: export.method.keeps_steps(),
             compares_rates: self.compares_rates(),
-            finds_by_parts: self.groups_a_step().is_some(),
+            finds_by_parts: self.steps_to_find().is_some(),
             looks_ahead: self.ahead.is_some(),
             moves_ahead: self.ahead.is_some() && self.motion_of_rates > 0,
             shows_ahead: self.ahead.as_ref().is_some_and(|ahead| ahead.shown > 0),

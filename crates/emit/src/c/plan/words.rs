@@ -102,7 +102,7 @@ impl Plan<'_> {
             ("COMMON", beside.map_or(0, Beside::size).to_string()),
             ("COMMON_BLOCKS", join(block_numbers(beside.map_or(&[][..], |b| &b.blocks)))),
             ("COMMON_BLOCK_COUNT", beside.map_or(0, |b| b.blocks.len()).to_string()),
-            ("GROUPS_A_STEP", self.groups_a_step().unwrap_or(groups.len()).to_string()),
+            ("STEPS_TO_FIND", self.steps_to_find().unwrap_or(1).to_string()),
             ("NONZEROS", columns.iter().map(Vec::len).sum::<usize>().to_string()),
             ("COLUMN_STARTS", lines(lengths(&columns))),
             ("COLUMN_ROWS", lines(flat(&columns))),

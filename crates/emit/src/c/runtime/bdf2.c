@@ -20,7 +20,8 @@ static void ha_forget_steps(ha_model *m)
     m->jacobian_known = 0;
     m->jacobian_steps = 0;
 //if finds_by_parts
-    m->next_groups = 0;
+    m->next_steps = 0;
+    m->next_waits = 0;
 //end
 }
 
@@ -242,7 +243,7 @@ static void ha_find_all(ha_model *m, double t, $real h, const $real *x)
     m->jacobian_known = 1;
     m->jacobian_steps = 0;
 //if finds_by_parts
-    m->next_groups = 0;
+    m->next_steps = 0;
 //end
 }
 
@@ -251,8 +252,8 @@ static void ha_find_all(ha_model *m, double t, $real h, const $real *x)
 /* From now on a Jacobian at this state is found, unless one is. */
 static void ha_want_next(ha_model *m, const $real *x)
 {
-    if (!m->next_groups) {
-        m->next_groups = $GROUPS;
+    if (!m->next_steps) {
+        m->next_steps = $STEPS_TO_FIND;
         $ha_copy(m->next_at, x, HA_NX);
     }
 }
@@ -280,8 +281,8 @@ static int ha_find_rates_at(ha_model *m, double t)
 /* Finds some columns of the Jacobian that is to follow, which takes the place of the present one where it is whole. */
 static void ha_find_some(ha_model *m, double t, $real h)
 {
-    const int begin = $GROUPS - m->next_groups;
-    const int end = begin + $GROUPS_A_STEP < $GROUPS ? begin + $GROUPS_A_STEP : $GROUPS;
+    const int begin = ($STEPS_TO_FIND - m->next_steps) * $GROUPS;
+    const int end = begin + $GROUPS;
     int group;
     $ha_copy(m->at, m->next_at, HA_NX);
 //if knows_common
@@ -289,18 +290,19 @@ static void ha_find_some(ha_model *m, double t, $real h)
 //end
 //if compares_rates
     if (!$ha_find_rates_at(m, t)) {
-        m->next_groups = 0;
+        m->next_steps = 0;
         return;
     }
 //end
-    for (group = begin; group < end; ++group) {
+    /* Neighbours, which are computed by the same code. */
+    for (group = (begin + $STEPS_TO_FIND - 1) / $STEPS_TO_FIND; group * $STEPS_TO_FIND < end; ++group) {
         if (!$ha_find_columns(m, t, h, group, m->next_jacobian)) {
-            m->next_groups = 0;
+            m->next_steps = 0;
             return;
         }
     }
-    m->next_groups = $GROUPS - end;
-    if (m->next_groups == 0) {
+    m->next_steps -= 1;
+    if (m->next_steps == 0) {
         $ha_copy(m->jacobian, m->next_jacobian, $NONZEROS);
         m->jacobian_scale = $0.0;
         m->jacobian_steps = 0;
@@ -330,8 +332,10 @@ static int ha_look_along(ha_model *m, double t, $real h, const $real *x)
 static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on)
 {
 //if finds_by_parts
-    const int follows = m->next_groups > 0;
+    const int follows = m->next_steps > 0;
     const int looks = m->jacobian_doubted || (!follows && m->jacobian_steps + goes_on >= 8);
+    const int finds = follows && (m->next_waits || !(looks || !m->before_counts));
+    m->next_waits = follows && !finds;
 //else
     const int looks = m->jacobian_doubted || m->jacobian_steps + goes_on >= 8;
 //end
@@ -344,7 +348,7 @@ static void ha_renew(ha_model *m, double t, $real h, const $real *x, int goes_on
         (void)$ha_look_along(m, t, h, x);
     }
 //if finds_by_parts
-    if (follows && m->next_groups) {
+    if (finds && m->next_steps) {
         $ha_find_some(m, t, h);
     }
 //end
@@ -514,12 +518,14 @@ static int ha_method(ha_model *m, double t, $real h, const $real *x)
 }
 
 //entry ha_prepare
-/* Finds the Jacobian where a run begins, so that the first step does not. Where there are no rates, that step tells. */
+/* Finds the Jacobian where a run begins, and factors it, so that the first step does not. Where there are no rates, or no factors, that
+ * step tells. */
 static void ha_prepare(ha_model *m)
 {
+    const $real h = $narrow(m->step);
     if ($model_rates(m, m->t, m->x, m->last_rates) == $MODEL_OK) {
-        $ha_renew(m, m->t, $narrow(m->step), m->x, 0);
-    } else {
-        m->failure.code = $MODEL_OK;
+        $ha_renew(m, m->t, h, m->x, 0);
+        (void)$ha_factor_kept(m, m->t, h);
     }
+    m->failure.code = $MODEL_OK;
 }
