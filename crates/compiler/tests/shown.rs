@@ -212,7 +212,7 @@ fn strands_that_are_alike_are_one_equation_of_vectors() {
     assert_eq!(print(&only(alike, &[]), Style::Unicode), [""; 0]);
     // Another mass in one strand, and another force.
     let text_of = |mass: &str, rest: &str| text(&ball(mass, rest));
-    assert_eq!(text_of("diag([2, 2, 3])", "")[2..], ["3 f_m.z' = -b f_m.z - 5 q_rope.z - 19.62", whole[1]]);
+    assert_eq!(text_of("diag([2, 2, 3])", ""), [&format!("diag([2, 2, 3]) f_m'{}", &whole[0][6..]), whole[1]]);
     let pushed = "input push = 0\nSe:wind(push) -> v.x\n";
     assert_eq!(text_of("2", pushed)[0], "2 f_m' = -b f_m - 5 q_rope + [push, 0, -19.62]");
     // What has a name of its own keeps it.
@@ -220,6 +220,44 @@ fn strands_that_are_alike_are_one_equation_of_vectors() {
     // What reads another strand, or a strand otherwise than in proportion, is no vector.
     let across = "v.x -> R:one(e = 2*f*abs(f))\n";
     assert_eq!(text_of("2", across).len(), 4);
+}
+
+#[test]
+fn strands_that_turn_into_each_other_are_one_equation_of_vectors() {
+    let body = |inertia: &str, rest: &str| {
+        shown_of(&format!(
+            "model Body\nparam m = 2, J1 = 1, J2 = 2, J3 = 3\n1[3]:v -> I[3]:mass(m, f0 = [1, 0, 0])\n\
+             1[3]:w -> I[3]:body({inertia}, f0 = [0, 0.1, 1])\nw -> GY[3]:ejs(skew(body.p))\n\
+             v -> GY[3]:turn(m*skew(w.f))\nw -> R[3]:drag(0.5)\nSe[3]:push([0, 0, 3]) -> v\n{rest}"
+        ))
+    };
+    // Newton and Euler, along the axes of the body.
+    let euler = body("diag([J1, J2, J3])", "");
+    let lines = [
+        "m f_mass' = -(m f_mass) × f_body + [0, 0, 3]",
+        "diag([J1, J2, J3]) f_body' = -f_body/2 + (diag([J1, J2, J3]) f_body) × f_body",
+    ];
+    assert_eq!(print(&euler, Style::Unicode), lines);
+    assert_eq!(print(&euler, Style::Ascii).len(), 6);
+    assert!(print(&euler, Style::Latex).iter().all(|line| well_set(line)));
+    let full = "[[2, 0.1, 0], [0.1, 1, 0], [0, 0, 3]]";
+    let expected = format!("{full} f_body' = -f_body/2 + ({full} f_body) × f_body");
+    assert_eq!(print(&body(full, ""), Style::Unicode)[1], expected);
+    let latex = &print(&body(full, ""), Style::Latex)[1];
+    assert!(
+        latex.starts_with(r"\begin{bmatrix} 2 & 0.1 & 0 \\ 0.1 & 1 & 0 \\ 0 & 0 & 3 \end{bmatrix} \, \dot{f}"),
+        "{latex}"
+    );
+    // A lever from the speeds to others: a matrix.
+    let lever = "w -> TF[3, 3]:lever([[0, 1, 0], [-1, 0, 0.5], [0, 0, 0.2]]) -> 1[3]:u -> R[3]:r(2)\n";
+    let expected = "diag([J1, J2, J3]) f_body' = -[[2.5, 0, -1], [0, 2.5, 0], [-1, 0, 1.08]] f_body \
+                    + (diag([J1, J2, J3]) f_body) × f_body";
+    assert_eq!(print(&body("diag([J1, J2, J3])", lever), Style::Unicode)[1], expected);
+    // A force that one strand makes of another one otherwise: rows stay.
+    assert_eq!(print(&body("diag([J1, J2, J3])", "w.x -> R:one(e = 2*f*abs(f))\n"), Style::Unicode).len(), 4);
+    // Vectors of more than three strands.
+    let wide = text("model Wide\n1[6]:six -> R[6]:mount(3)\nsix -> I[6]:mass(4)\n");
+    assert_eq!(wide, ["4 f_mass' = -3 f_mass"]);
 }
 
 /// The unknowns of a page: what it names that is neither given, nor a state, nor defined on it.

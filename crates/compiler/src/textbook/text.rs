@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter, Result};
 
+use super::vectors::{Matrix, Product};
 use super::{Dependent, DisplayEquation, Shown, ShownDefinition, VectorEquation, places};
 use crate::algebra::{
-    Expr, Exprs, Names, Place, Sort, Symbol, ascii, ascii_within, dotted, latex, latex_name, latex_owner, mathml_name,
-    mathml_owner, mathml_within, unicode_name, unicode_within,
+    Expr, Exprs, Names, Node, Place, Sort, Symbol, ZERO, ascii, ascii_within, dotted, latex, latex_name, latex_owner,
+    mathml_name, mathml_owner, mathml_within, unicode_name, unicode_within,
 };
 use crate::bond_graph::{Action, BondGraph, Clause, Element, ElementId, Kind, Meaning, Trigger};
 use crate::causal_paths::Refusal;
@@ -49,8 +50,16 @@ pub fn sides_within(shown: &Shown, style: Style, most: usize) -> impl Iterator<I
             Line::Row(row) if style == Style::Ascii => (side(row.closed.0), side(row.closed.1)),
             Line::Row(row) => (side(row.left), side(row.right)),
             Line::Vector(row) => {
-                let added: Vec<String> = row.added.iter().map(|&e| side(e)).collect();
-                (side(row.left), side(row.right) + &plus_vector(&added, style))
+                let mut right = if row.right == ZERO { String::new() } else { side(row.right) };
+                for of in &row.products {
+                    right += &sign(of.negative, right.is_empty(), style);
+                    right += &product(names.x, of, &side, style);
+                }
+                if !row.added.is_empty() {
+                    right += &sign(false, right.is_empty(), style);
+                    right += &bracketed(&row.added.iter().map(|&e| side(e)).collect::<Vec<_>>(), style);
+                }
+                (product(names.x, &row.left, &side, style), right)
             }
         }
     })
@@ -76,13 +85,66 @@ fn lines(shown: &Shown, style: Style) -> impl Iterator<Item = Line<'_>> {
     })
 }
 
-/// A vector that is added, by what stands in its strands.
-fn plus_vector(strands: &[String], style: Style) -> String {
+/// What stands before a term.
+fn sign(negative: bool, is_first: bool, style: Style) -> String {
+    let sign = if negative { "-" } else { "+" };
+    match (style, is_first) {
+        (_, true) if !negative => String::new(),
+        (Style::MathMl, _) => format!("<mo>{sign}</mo>"),
+        (_, true) => sign.to_string(),
+        (_, false) => format!(" {sign} "),
+    }
+}
+
+/// A vector by what stands in its strands.
+fn bracketed(strands: &[String], style: Style) -> String {
     match style {
-        _ if strands.is_empty() => String::new(),
-        Style::Ascii | Style::Unicode => format!(" + [{}]", strands.join(", ")),
-        Style::Latex => format!(" + \\begin{{bmatrix}} {} \\end{{bmatrix}}", strands.join(" \\\\ ")),
-        Style::MathMl => format!("<mo>+</mo><mo>[</mo>{}<mo>]</mo>", strands.join("<mo>,</mo>")),
+        Style::Ascii | Style::Unicode => format!("[{}]", strands.join(", ")),
+        Style::Latex => format!(r"\begin{{bmatrix}} {} \end{{bmatrix}}", strands.join(r" \\ ")),
+        Style::MathMl => format!("<mo>[</mo>{}<mo>]</mo>", strands.join("<mo>,</mo>")),
+    }
+}
+
+/// A matrix times a vector, across another one.
+fn product(x: &Exprs, of: &Product, side: &impl Fn(Expr) -> String, style: Style) -> String {
+    let each = |entries: &[Expr]| entries.iter().map(|&e| side(e)).collect::<Vec<_>>();
+    let vector = side(of.vector);
+    let is_name = matches!((&of.matrix, x.node(of.vector)), (Matrix::Unit, Node::Symbol(_)));
+    let (space, cross) = match style {
+        Style::Ascii | Style::Unicode => (" ", " × "),
+        Style::Latex => (r" \, ", r" \times "),
+        Style::MathMl => ("<mo>&#x2062;</mo>", "<mo>×</mo>"),
+    };
+    let diagonal = |list: &str| match style {
+        Style::Ascii | Style::Unicode => format!("diag([{list}])"),
+        Style::Latex => format!(r"\operatorname{{diag}}({list})"),
+        Style::MathMl => format!("<mi>diag</mi><mo>(</mo>{list}<mo>)</mo>"),
+    };
+    let comma = if style == Style::MathMl { "<mo>,</mo>" } else { ", " };
+    let own = match &of.matrix {
+        Matrix::Unit => vector,
+        Matrix::Diagonal(entries) => diagonal(&each(entries).join(comma)) + space + &vector,
+        Matrix::Skew(entries) => bracketed(&each(entries), style) + cross + &vector,
+        Matrix::Full(rows) => {
+            let rows: Vec<Vec<String>> = rows.iter().map(|row| each(row)).collect();
+            let matrix = match style {
+                Style::Latex => bracketed(&rows.iter().map(|row| row.join(" & ")).collect::<Vec<_>>(), style),
+                _ => bracketed(&rows.iter().map(|row| bracketed(row, style)).collect::<Vec<_>>(), style),
+            };
+            matrix + space + &vector
+        }
+    };
+    match of.across {
+        None => own,
+        Some(across) if is_name => own + cross + &side(across),
+        Some(across) => within(&own, style) + cross + &side(across),
+    }
+}
+
+fn within(text: &str, style: Style) -> String {
+    match style {
+        Style::MathMl => format!("<mo>(</mo>{text}<mo>)</mo>"),
+        _ => format!("({text})"),
     }
 }
 

@@ -1,16 +1,17 @@
-//! Equations of the strands of a multibond that are alike, as one equation of vectors: `2 f_m' = -b f_m + [0, 0, -19.62]`.
+//! Equations of the strands of a multibond as one equation of vectors: those that are alike, `2 f_m' = -b f_m + [0, 0, -19.62]`,
+//! and those that matrices and cross products couple, `diag([2, 1, 3]) f_body' = (diag([2, 1, 3]) f_body) × f_body`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::display::{DisplayEquation, LONGEST, textbook};
 use super::text::element_name;
-use crate::algebra::{Expr, Exprs, Facts, Symbol};
+use crate::algebra::{Expr, Exprs, Facts, ONE, PlainNames, Symbol, ZERO, ascii};
 use crate::bond_graph::{BondGraph, part_name, strand_name};
 use crate::equations::State;
 
-/// Strands of a vector at most: those of more have numbers.
-const MOST: usize = 3;
+/// Strands that coupled equations read at most.
+const MOST: usize = 24;
 
 /// Equations of vectors.
 #[derive(Debug, Clone, Default)]
@@ -21,17 +22,115 @@ pub struct Vectors {
     pub names: BTreeMap<Symbol, (String, bool)>,
 }
 
-/// An equation of vectors: `left = right + added`.
+/// An equation of vectors: `left = right + products + added`.
 #[derive(Debug, Clone)]
 pub struct VectorEquation {
     /// Which equations it stands for, one a strand.
     pub rows: Range<usize>,
-    /// A multiple of the rate of a vector.
-    pub left: Expr,
-    /// A sum of multiples of vectors.
+    /// The rate of a vector.
+    pub left: Product,
+    /// A sum of multiples of vectors; 0 where there are none.
     pub right: Expr,
+    /// Vectors that a matrix multiplies, or another vector.
+    pub products: Vec<Product>,
     /// What stands beside them in each strand; empty where nothing does.
     pub added: Vec<Expr>,
+}
+
+/// A matrix times a vector, across another one: `(J f) × w`.
+#[derive(Debug, Clone)]
+pub struct Product {
+    /// Whether it is taken away.
+    pub negative: bool,
+    /// The matrix.
+    pub matrix: Matrix,
+    /// The vector, or a multiple of it.
+    pub vector: Expr,
+    /// What stands behind the cross.
+    pub across: Option<Expr>,
+}
+
+/// What multiplies a vector.
+#[derive(Debug, Clone)]
+pub enum Matrix {
+    /// Nothing.
+    Unit,
+    /// A matrix with nothing beside its diagonal.
+    Diagonal(Vec<Expr>),
+    /// What a vector across makes of another one.
+    Skew(Vec<Expr>),
+    /// Any other, by rows.
+    Full(Vec<Vec<Expr>>),
+}
+
+impl Matrix {
+    /// The matrix with these rows, and its multiple of the unit if it is one.
+    fn of(x: &mut Exprs, rows: &[Vec<Expr>]) -> (Matrix, Expr) {
+        let of = rows.len();
+        let at = |row: usize, column: usize| rows[row][column];
+        let beside = || (0..of).flat_map(|row| (0..of).filter(move |column| *column != row).map(move |c| (row, c)));
+        if beside().all(|(row, column)| at(row, column) == ZERO) {
+            let diagonal: Vec<Expr> = (0..of).map(|i| at(i, i)).collect();
+            return match diagonal.iter().all(|&e| e == diagonal[0]) {
+                true => (Matrix::Unit, diagonal[0]),
+                false => (Matrix::Diagonal(diagonal), ONE),
+            };
+        }
+        let mut mirrored = |(row, column): (usize, usize)| {
+            let sum = x.add(&[at(row, column), at(column, row)]);
+            x.is_zero(sum)
+        };
+        if of == 3 && beside().chain((0..of).map(|i| (i, i))).all(&mut mirrored) {
+            return (Matrix::Skew(vec![at(2, 1), at(0, 2), at(1, 0)]), ONE);
+        }
+        (Matrix::Full(rows.to_vec()), ONE)
+    }
+
+    fn entries(&self) -> Vec<Expr> {
+        match self {
+            Matrix::Unit => Vec::new(),
+            Matrix::Diagonal(entries) | Matrix::Skew(entries) => entries.clone(),
+            Matrix::Full(rows) => rows.concat(),
+        }
+    }
+
+    /// The same with the other sign.
+    fn turned(&self, x: &mut Exprs) -> Matrix {
+        let mut turned = |entries: &[Expr]| {
+            let turned = entries.iter().map(|&e| x.neg(e));
+            turned.collect::<Vec<_>>().into_iter().map(|e| textbook(x, e)).collect::<Vec<Expr>>()
+        };
+        match self {
+            Matrix::Unit => Matrix::Unit,
+            Matrix::Diagonal(entries) => Matrix::Diagonal(turned(entries)),
+            Matrix::Skew(entries) => Matrix::Skew(turned(entries)),
+            Matrix::Full(rows) => Matrix::Full(rows.iter().map(|row| turned(row)).collect()),
+        }
+    }
+}
+
+impl Product {
+    /// A matrix times a vector, taken away where that saves signs.
+    fn new(x: &mut Exprs, matrix: Matrix, vector: Expr) -> Product {
+        let minus = |x: &Exprs, e: Expr| ascii(x, e, &PlainNames(x)).starts_with('-');
+        let entries = matrix.entries();
+        let signs = entries.iter().filter(|&&e| e != ZERO).map(|&e| minus(x, e)).collect::<Vec<_>>();
+        let negative = 2 * signs.iter().filter(|&&minus| minus).count() > signs.len();
+        let matrix = if negative { matrix.turned(x) } else { matrix };
+        Product { negative, matrix, vector, across: None }
+    }
+
+    /// How long it is in print, as [`Exprs::printed_length`] counts.
+    fn length(&self, x: &Exprs) -> u64 {
+        let brackets = match &self.matrix {
+            Matrix::Unit => 0,
+            Matrix::Diagonal(_) | Matrix::Skew(_) => 2,
+            Matrix::Full(rows) => rows.len() as u64 + 1,
+        };
+        let entries: u64 = self.matrix.entries().iter().map(|&e| x.printed_length(e)).sum();
+        let across = self.across.map_or(0, |across| x.printed_length(across) + 1);
+        brackets + entries + x.printed_length(self.vector) + across
+    }
 }
 
 /// A strand of a vector.
@@ -55,18 +154,23 @@ pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) ->
     let mut known: BTreeMap<(String, bool), Symbol> = BTreeMap::new();
     let mut at = 0;
     while at < display.len() {
-        let Some(rows) = strands.alike(x, &display[at..]) else {
-            at += 1;
-            continue;
-        };
         let mut vector = |x: &mut Exprs, of: &(String, bool)| {
             let symbol = *known.entry(of.clone()).or_insert_with(|| x.fresh(&of.0, Facts::default()));
             found.names.insert(symbol, of.clone());
             x.sym(symbol)
         };
+        let Some(rows) = strands.alike(x, &display[at..]) else {
+            let coupled = strands.coupled(x, &display[at..], &mut vector);
+            at += coupled.as_ref().map_or(1, |coupled| coupled.rows.end);
+            found
+                .equations
+                .extend(coupled.map(|coupled| VectorEquation { rows: at - coupled.rows.end..at, ..coupled }));
+            continue;
+        };
         let (of, coefficient) = &rows[0].left;
         let own = vector(x, of);
-        let left = x.mul(&[*coefficient, own]);
+        let own = x.mul(&[*coefficient, own]);
+        let left = Product { negative: false, matrix: Matrix::Unit, vector: own, across: None };
         let mut terms = Vec::new();
         for (of, &coefficient) in &rows[0].right {
             let own = vector(x, of);
@@ -77,7 +181,7 @@ pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) ->
         let is_added = rows.iter().any(|row| !x.is_zero(row.rest));
         let added = if is_added { rows.iter().map(|row| row.rest).collect() } else { Vec::new() };
         let end = at + rows.len();
-        found.equations.push(VectorEquation { rows: at..end, left, right, added });
+        found.equations.push(VectorEquation { rows: at..end, left, right, products: Vec::new(), added });
         at = end;
     }
     found
@@ -132,6 +236,172 @@ impl Strands {
         (whole < apart).then_some(rows)
     }
 
+    /// The first equations, one of each strand of a vector, if matrices and cross products couple them, and they are shorter as
+    /// one: `M x' = sum of A y + (M x) × w + rest`, as momentum turns in the axes of a body.
+    fn coupled(
+        &self,
+        x: &mut Exprs,
+        display: &[DisplayEquation],
+        vector: &mut dyn FnMut(&mut Exprs, &(String, bool)) -> Expr,
+    ) -> Option<VectorEquation> {
+        let first = x.symbols_of(display[0].left);
+        let strand = first.iter().find_map(|symbol| self.0.get(symbol))?;
+        let (name, of) = (strand.vector.clone(), strand.of);
+        let own = display.get(..of).filter(|_| name.1)?;
+        if own.iter().any(|e| x.printed_length(e.left).max(x.printed_length(e.right)) > LONGEST) {
+            return None;
+        }
+        let rates = self.whole(&name, of)?;
+        let mut mass = Vec::new();
+        for equation in own {
+            let (row, rest) = x.linear_in(equation.left, &rates)?;
+            let reads_strand = row.iter().any(|&e| x.depends_on_any(e, &|s| self.0.contains_key(&s)));
+            if rest != ZERO || reads_strand {
+                return None;
+            }
+            mass.push(row);
+        }
+        let rights: Vec<Expr> = own.iter().map(|equation| equation.right).collect();
+        let apart: u64 = own.iter().map(|e| x.printed_length(e.left) + x.printed_length(e.right)).sum();
+        let mut as_one = |x: &mut Exprs, mass: &[Vec<Expr>], rights: &[Expr]| {
+            let (found, length) = self.as_one(x, &name, (mass, rights), vector)?;
+            // A matrix is harder to read than its rows.
+            (5 * length <= 4 * apart).then_some(found)
+        };
+        as_one(x, &mass, &rights).or_else(|| {
+            let (mass, rights) = with_one_mass(x, &mass, &rights)?;
+            as_one(x, &mass, &rights)
+        })
+    }
+
+    /// Equations of the strands of a vector as one, and its length in print.
+    fn as_one(
+        &self,
+        x: &mut Exprs,
+        name: &(String, bool),
+        (mass, rights): (&[Vec<Expr>], &[Expr]),
+        vector: &mut dyn FnMut(&mut Exprs, &(String, bool)) -> Expr,
+    ) -> Option<(VectorEquation, u64)> {
+        let of = mass.len();
+        let mut read: Vec<(String, bool)> = Vec::new();
+        for symbol in rights.iter().flat_map(|&e| x.symbols_of(e)) {
+            read.extend(self.0.get(&symbol).filter(|strand| strand.of == of).map(|strand| strand.vector.clone()));
+        }
+        read.sort();
+        read.dedup();
+        let vectors: Vec<Vec<Symbol>> = read.iter().map(|name| self.whole(name, of)).collect::<Option<_>>()?;
+        if vectors.is_empty() || of * vectors.len() > MOST {
+            return None;
+        }
+        let nothing: BTreeMap<Symbol, Expr> = vectors.iter().flatten().map(|&symbol| (symbol, ZERO)).collect();
+        let mut linear = Vec::new();
+        let mut left_over = rights.to_vec();
+        for symbols in &vectors {
+            let mut rows = Vec::new();
+            for (row, &right) in rights.iter().enumerate() {
+                let mut entries = Vec::new();
+                for &symbol in symbols {
+                    let entry = x.derivative(right, symbol);
+                    let entry = x.substitute(entry, &nothing);
+                    let entry = if x.is_zero(entry) { ZERO } else { textbook(x, entry) };
+                    let own = x.sym(symbol);
+                    let term = x.mul(&[entry, own]);
+                    left_over[row] = x.sub(left_over[row], term);
+                    entries.push(entry);
+                }
+                rows.push(entries);
+            }
+            linear.push(rows);
+        }
+        let mut added = Vec::new();
+        for (row, &right) in rights.iter().enumerate() {
+            let rest = x.substitute(right, &nothing);
+            left_over[row] = x.sub(left_over[row], rest);
+            added.push(if x.is_zero(rest) { ZERO } else { textbook(x, rest) });
+        }
+        let (left, multiple) = Matrix::of(x, mass);
+        let across = self.across(x, name, (mass, &vectors), &left_over)?;
+        let mut sum = Vec::new();
+        let mut products = Vec::new();
+        for (name, rows) in read.iter().zip(&linear).filter(|(_, rows)| rows.iter().flatten().any(|&e| e != ZERO)) {
+            let own = vector(x, name);
+            match Matrix::of(x, rows) {
+                (Matrix::Unit, coefficient) => sum.push(x.mul(&[coefficient, own])),
+                (matrix, _) => products.push(Product::new(x, matrix, own)),
+            }
+        }
+        if let Some((at, negative)) = across {
+            let (own, across) = (vector(x, &(name.0.clone(), false)), vector(x, &read[at]));
+            let own = x.mul(&[multiple, own]);
+            products.push(Product { negative, matrix: left.clone(), vector: own, across: Some(across) });
+        }
+        let right = x.add(&sum);
+        let right = textbook(x, right);
+        let rate = vector(x, name);
+        let left = Product { negative: false, matrix: left, vector: x.mul(&[multiple, rate]), across: None };
+        let added = if added.iter().all(|&e| e == ZERO) { Vec::new() } else { added };
+        let length = left.length(x)
+            + x.printed_length(right)
+            + products.iter().map(|product| product.length(x) + 1).sum::<u64>()
+            + added.iter().map(|&e| x.printed_length(e)).sum::<u64>();
+        Some((VectorEquation { rows: 0..of, left, right, products, added }, length))
+    }
+
+    /// Across which vector the momentum `mass · own` stands in what is left over, and whether it is taken away; `None` inside where
+    /// nothing is left over, and outside where it is something else.
+    fn across(
+        &self,
+        x: &mut Exprs,
+        own: &(String, bool),
+        (mass, vectors): (&[Vec<Expr>], &[Vec<Symbol>]),
+        left_over: &[Expr],
+    ) -> Option<Option<(usize, bool)>> {
+        if left_over.iter().all(|&e| x.is_zero(e)) {
+            return Some(None);
+        }
+        let own = self.whole(&(own.0.clone(), false), mass.len()).filter(|_| mass.len() == 3)?;
+        let mut momentum = Vec::new();
+        for row in mass {
+            let mut terms = Vec::new();
+            for (&entry, &symbol) in row.iter().zip(&own) {
+                let symbol = x.sym(symbol);
+                terms.push(x.mul(&[entry, symbol]));
+            }
+            momentum.push(x.add(&terms));
+        }
+        for (at, across) in vectors.iter().enumerate() {
+            let across: Vec<Expr> = across.iter().map(|&symbol| x.sym(symbol)).collect();
+            let mut parts = Vec::new();
+            for i in 0..3 {
+                let (next, last) = ((i + 1) % 3, (i + 2) % 3);
+                let (a, b) = (x.mul(&[momentum[next], across[last]]), x.mul(&[momentum[last], across[next]]));
+                parts.push(x.sub(a, b));
+            }
+            let mut is = |negative: bool| {
+                left_over.iter().zip(&parts).all(|(&e, &part)| {
+                    let rest = if negative { x.add(&[e, part]) } else { x.sub(e, part) };
+                    x.is_zero(rest)
+                })
+            };
+            if is(false) {
+                return Some(Some((at, false)));
+            }
+            if is(true) {
+                return Some(Some((at, true)));
+            }
+        }
+        None
+    }
+
+    /// The strands of a vector in their order.
+    fn whole(&self, name: &(String, bool), of: usize) -> Option<Vec<Symbol>> {
+        let mut whole = vec![None; of];
+        for (&symbol, strand) in self.0.iter().filter(|(_, strand)| strand.vector == *name && strand.of == of) {
+            whole[strand.at] = Some(symbol);
+        }
+        whole.into_iter().collect()
+    }
+
     fn row(&self, x: &mut Exprs, equation: &DisplayEquation, (at, of): (usize, usize)) -> Option<Row> {
         if x.printed_length(equation.right) > LONGEST {
             return None;
@@ -155,19 +425,35 @@ impl Strands {
     }
 }
 
+/// Equations that each were divided by what it could be, `f' = …` and `m f' = …`, with the same multiple of each rate.
+fn with_one_mass(x: &mut Exprs, mass: &[Vec<Expr>], rights: &[Expr]) -> Option<(Vec<Vec<Expr>>, Vec<Expr>)> {
+    let (Matrix::Diagonal(own), _) = Matrix::of(x, mass) else { return None };
+    let one = own.iter().copied().max_by_key(|&e| x.printed_length(e))?;
+    let mut scaled = Vec::new();
+    for (&own, &right) in own.iter().zip(rights) {
+        if own == ZERO {
+            return None;
+        }
+        let factor = x.div(one, own);
+        let right = x.mul(&[factor, right]);
+        scaled.push(textbook(x, right));
+    }
+    let mass = (0..own.len()).map(|row| (0..own.len()).map(|column| if row == column { one } else { ZERO }).collect());
+    Some((mass.collect(), scaled))
+}
+
 /// The strands of multibonds and of elements on them by name, each with the name of the whole, its place and their number.
 fn places(graph: &BondGraph) -> BTreeMap<String, (String, usize, usize)> {
     let mut places = BTreeMap::new();
     for element in graph.elements.values() {
         if let Some((at, of)) = element.strand.map(|(at, of)| (at as usize, of as usize))
-            && of <= MOST
             && let Some(base) = element.name.strip_suffix(&part_name("", &strand_name(at, of)))
         {
             places.insert(element.name.clone(), (base.to_string(), at, of));
         }
         let of = element.ports.len();
         let is_strand = |at: usize| element.ports[at].name == strand_name(at, of);
-        for at in (0..of).filter(|_| (2..=MOST).contains(&of) && (0..of).all(is_strand)) {
+        for at in (0..of).filter(|_| of > 1 && (0..of).all(is_strand)) {
             places.insert(element.part_name(at), (element.name.clone(), at, of));
         }
     }
