@@ -79,7 +79,7 @@ fn models_in_the_language_document_run() {
 
 #[test]
 fn models_in_the_multibody_document_run() {
-    snippets_run("docs/multibody.md", 7);
+    snippets_run("docs/multibody.md", 8);
 }
 
 #[test]

@@ -113,7 +113,7 @@ fn product(x: &Exprs, of: &Product, side: &impl Fn(Expr) -> String, style: Style
     let (space, cross) = match style {
         Style::Ascii | Style::Unicode => (" ", " × "),
         Style::Latex => (r" \, ", r" \times "),
-        Style::MathMl => ("<mo>&#x2062;</mo>", "<mo>×</mo>"),
+        Style::MathMl => (r#"<mo>&#x2062;</mo><mspace width="0.14em"/>"#, "<mo>×</mo>"),
     };
     let diagonal = |list: &str| match style {
         Style::Ascii | Style::Unicode => format!("diag([{list}])"),
