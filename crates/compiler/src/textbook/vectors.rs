@@ -289,7 +289,9 @@ impl Strands {
         }
         read.sort();
         read.dedup();
-        let vectors: Vec<Vec<Symbol>> = read.iter().map(|name| self.whole(name, of)).collect::<Option<_>>()?;
+        // Of a source that is a number in some strands the others stand as they are.
+        read.retain(|name| self.whole(name, of).is_some());
+        let vectors: Vec<Vec<Symbol>> = read.iter().filter_map(|name| self.whole(name, of)).collect();
         if vectors.is_empty() || of * vectors.len() > MOST {
             return None;
         }
