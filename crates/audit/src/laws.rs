@@ -152,8 +152,11 @@ pub(crate) fn links(
                         |at: &[(Symbol, f64)]| moved_by(graph, (scales, settled), &reader, (middle, at), |v| v[0]);
                     let near = slopes(&[]);
                     let tells = tells(settled, near.iter().copied());
+                    let written = is_written_straight(&graph.exprs, right, reader.moves());
+                    let ways: &[f64] = if written { &[] } else { &[1.0, -1.0] };
                     // Where it has no value there, it is no straight line.
-                    let far = [1.0, -1.0].map(|way| slopes(&far(graph, (scales, settled), &reader, way)));
+                    let far: Vec<_> =
+                        ways.iter().map(|&way| slopes(&far(graph, (scales, settled), &reader, way))).collect();
                     links.extend(near.iter().enumerate().map(|(i, &(from, weight))| {
                         let same = far.iter().all(|far| far.get(i).is_some_and(|far| is_same(weight, far.1)));
                         Link { of, from, weight, straight: same && tells(from, weight) }
@@ -204,6 +207,23 @@ fn tells(settled: &Settled, terms: impl Iterator<Item = (Quantity, f64)>) -> imp
 /// straight line in it, and no other variable tells how steep, as the load of a tyre does that has left the ground.
 fn far(graph: &BondGraph, (scales, settled): (&Scales, &Settled), reader: &Reader, way: f64) -> Vec<(Symbol, f64)> {
     reader.moves().iter().map(|&symbol| (symbol, way * settled.of(scales.of(graph, symbol)))).collect()
+}
+
+/// Whether an expression is, as it is written, a sum of these symbols times what none of them moves.
+fn is_written_straight(x: &Exprs, e: Expr, moves: &[Symbol]) -> bool {
+    let moved = |e: Expr| x.depends_on_any(e, &|symbol| moves.contains(&symbol));
+    let is_straight = |term: Expr| {
+        let factors = match x.node(term) {
+            Node::Mul(factors) => &factors[..],
+            _ => &[term][..],
+        };
+        let mut moved = factors.iter().filter(|&&factor| moved(factor));
+        moved.next().is_none_or(|&own| matches!(x.node(own), Node::Symbol(_))) && moved.next().is_none()
+    };
+    match x.node(e) {
+        Node::Add(terms) => terms.iter().all(|&term| is_straight(term)),
+        _ => is_straight(e),
+    }
 }
 
 fn is_same(near: f64, far: f64) -> bool {

@@ -960,10 +960,10 @@ impl<'a> Builder<'a, '_> {
         let resistance = |d: Domain| d.effort().over(d.flow());
         let any = |of: &dyn Fn(Domain) -> Dim, wanted: Dim| Domain::ALL.into_iter().any(|d| of(d) == wanted);
         let (meant, is, takes) = match letter {
-            "c" if any(&compliance, dim.inverse()) && !any(&compliance, dim) => ("k", "a stiffness", "compliance"),
-            "k" if any(&compliance, dim) && !any(&compliance, dim.inverse()) => ("c", "a compliance", "stiffness"),
-            "r" if any(&resistance, dim.inverse()) && !any(&resistance, dim) => ("g", "a conductance", "resistance"),
-            "g" if any(&resistance, dim) && !any(&resistance, dim.inverse()) => ("r", "a resistance", "conductance"),
+            "c" if !any(&compliance, dim) && any(&compliance, dim.inverse()) => ("k", "a stiffness", "compliance"),
+            "k" if !any(&compliance, dim.inverse()) && any(&compliance, dim) => ("c", "a compliance", "stiffness"),
+            "r" if !any(&resistance, dim) && any(&resistance, dim.inverse()) => ("g", "a conductance", "resistance"),
+            "g" if !any(&resistance, dim.inverse()) && any(&resistance, dim) => ("r", "a resistance", "conductance"),
             _ => return false,
         };
         let p = self.part(part);
