@@ -90,7 +90,7 @@ fn sign(negative: bool, is_first: bool, style: Style) -> String {
     let sign = if negative { "-" } else { "+" };
     match (style, is_first) {
         (_, true) if !negative => String::new(),
-        (Style::MathMl, _) => format!("<mo>{sign}</mo>"),
+        (Style::MathMl, _) => format!("<mo>{}</mo>", if negative { "−" } else { "+" }),
         (_, true) => sign.to_string(),
         (_, false) => format!(" {sign} "),
     }

@@ -10,8 +10,8 @@ use crate::algebra::{Expr, Exprs, Facts, ONE, PlainNames, Symbol, ZERO, ascii};
 use crate::bond_graph::{BondGraph, part_name, strand_name};
 use crate::equations::State;
 
-/// Strands that coupled equations read at most.
-const MOST: usize = 24;
+/// Strands that the equations of a vector read at most.
+const MOST: usize = 1000;
 
 /// Equations of vectors.
 #[derive(Debug, Clone, Default)]
@@ -141,14 +141,7 @@ struct Strand {
     of: usize,
 }
 
-/// One equation, in what it has in common with those of other strands, and the rest.
-struct Row {
-    left: ((String, bool), Expr),
-    right: BTreeMap<(String, bool), Expr>,
-    rest: Expr,
-}
-
-/// The equations of strands that are alike.
+/// The equations of strands that are shorter as one.
 pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) -> Vectors {
     let mut found = Vectors::default();
     let mut known: BTreeMap<(String, bool), Symbol> = BTreeMap::new();
@@ -159,36 +152,18 @@ pub fn vectors(x: &mut Exprs, strands: &Strands, display: &[DisplayEquation]) ->
             found.names.insert(symbol, of.clone());
             x.sym(symbol)
         };
-        let Some(rows) = strands.alike(x, &display[at..]) else {
-            let coupled = strands.coupled(x, &display[at..], &mut vector);
-            at += coupled.as_ref().map_or(1, |coupled| coupled.rows.end);
-            found
-                .equations
-                .extend(coupled.map(|coupled| VectorEquation { rows: at - coupled.rows.end..at, ..coupled }));
-            continue;
-        };
-        let (of, coefficient) = &rows[0].left;
-        let own = vector(x, of);
-        let own = x.mul(&[*coefficient, own]);
-        let left = Product { negative: false, matrix: Matrix::Unit, vector: own, across: None };
-        let mut terms = Vec::new();
-        for (of, &coefficient) in &rows[0].right {
-            let own = vector(x, of);
-            terms.push(x.mul(&[coefficient, own]));
-        }
-        let right = x.add(&terms);
-        let right = textbook(x, right);
-        let is_added = rows.iter().any(|row| !x.is_zero(row.rest));
-        let added = if is_added { rows.iter().map(|row| row.rest).collect() } else { Vec::new() };
-        let end = at + rows.len();
-        found.equations.push(VectorEquation { rows: at..end, left, right, products: Vec::new(), added });
-        at = end;
+        let own = strands.together(x, (display, at), &mut vector);
+        at = own.as_ref().map_or(at + 1, |own| own.rows.end);
+        found.equations.extend(own);
     }
     found
 }
 
-/// Which variables belong to strands.
-pub struct Strands(BTreeMap<Symbol, Strand>);
+/// Which variables belong to strands, and the strands of each vector that has all of them, in their order.
+pub struct Strands {
+    of: BTreeMap<Symbol, Strand>,
+    whole: BTreeMap<(String, bool), Vec<Symbol>>,
+}
 
 impl Strands {
     /// Those of states that have no other name, of their rates, and of sources that stand by name.
@@ -216,46 +191,36 @@ impl Strands {
             let name = element_name(graph, symbol);
             of.extend(strand(places.get(&name), None, false).map(|strand| (symbol, strand)));
         }
-        Strands(of)
-    }
-
-    /// The first equations, one of each strand of a vector, if they are alike, and shorter as one.
-    fn alike(&self, x: &mut Exprs, display: &[DisplayEquation]) -> Option<Vec<Row>> {
-        let first = x.symbols_of(display[0].left);
-        let of = first.iter().find_map(|symbol| self.0.get(symbol)).filter(|strand| strand.at == 0)?.of;
-        let own = display.get(..of)?;
-        let rows = own.iter().enumerate().map(|(at, equation)| self.row(x, equation, (at, of)));
-        let rows = rows.collect::<Option<Vec<Row>>>()?;
-        let same = |row: &Row| row.left == rows[0].left && row.right == rows[0].right;
-        if !rows.iter().all(same) || rows[0].right.is_empty() {
-            return None;
+        let mut parts: BTreeMap<(String, bool), Vec<Option<Symbol>>> = BTreeMap::new();
+        for (&symbol, strand) in &of {
+            let parts = parts.entry(strand.vector.clone()).or_insert_with(|| vec![None; strand.of]);
+            parts[strand.at] = Some(symbol);
         }
-        let length = |e: Expr| x.printed_length(e);
-        let apart: u64 = own.iter().map(|e| length(e.left) + length(e.right)).sum();
-        let whole = length(own[0].left) + length(own[0].right) + rows.iter().map(|row| length(row.rest)).sum::<u64>();
-        (whole < apart).then_some(rows)
+        let whole =
+            parts.into_iter().filter_map(|(name, parts)| Some((name, parts.into_iter().collect::<Option<_>>()?)));
+        Strands { whole: whole.collect(), of }
     }
 
-    /// The first equations, one of each strand of a vector, if matrices and cross products couple them, and they are shorter as
-    /// one: `M x' = sum of A y + (M x) × w + rest`, as momentum turns in the axes of a body.
-    fn coupled(
+    /// The equations from a place on, one of each strand of a vector, where they are shorter as one:
+    /// `M x' = sum of A y + (M x) × w + rest`, as momentum turns in the axes of a body.
+    fn together(
         &self,
         x: &mut Exprs,
-        display: &[DisplayEquation],
+        (display, at): (&[DisplayEquation], usize),
         vector: &mut dyn FnMut(&mut Exprs, &(String, bool)) -> Expr,
     ) -> Option<VectorEquation> {
-        let first = x.symbols_of(display[0].left);
-        let strand = first.iter().find_map(|symbol| self.0.get(symbol))?;
+        let first = x.symbols_of(display[at].left);
+        let strand = first.iter().find_map(|symbol| self.of.get(symbol))?;
         let (name, of) = (strand.vector.clone(), strand.of);
-        let own = display.get(..of).filter(|_| name.1)?;
+        let own = display.get(at..at + of).filter(|_| name.1)?;
         if own.iter().any(|e| x.printed_length(e.left).max(x.printed_length(e.right)) > LONGEST) {
             return None;
         }
-        let rates = self.whole(&name, of)?;
+        let rates = self.whole.get(&name)?;
         let mut mass = Vec::new();
         for equation in own {
-            let (row, rest) = x.linear_in(equation.left, &rates)?;
-            let reads_strand = row.iter().any(|&e| x.depends_on_any(e, &|s| self.0.contains_key(&s)));
+            let (row, rest) = x.linear_in(equation.left, rates)?;
+            let reads_strand = row.iter().any(|&e| x.depends_on_any(e, &|s| self.of.contains_key(&s)));
             if rest != ZERO || reads_strand {
                 return None;
             }
@@ -265,8 +230,10 @@ impl Strands {
         let apart: u64 = own.iter().map(|e| x.printed_length(e.left) + x.printed_length(e.right)).sum();
         let mut as_one = |x: &mut Exprs, mass: &[Vec<Expr>], rights: &[Expr]| {
             let (found, length) = self.as_one(x, &name, (mass, rights), vector)?;
+            let multiples = found.products.is_empty() && matches!(found.left.matrix, Matrix::Unit);
             // A matrix is harder to read than its rows.
-            (5 * length <= 4 * apart).then_some(found)
+            let is_shorter = if multiples { length < apart } else { 5 * length <= 4 * apart };
+            is_shorter.then_some(VectorEquation { rows: at..at + of, ..found })
         };
         as_one(x, &mass, &rights).or_else(|| {
             let (mass, rights) = with_one_mass(x, &mass, &rights)?;
@@ -285,24 +252,28 @@ impl Strands {
         let of = mass.len();
         let mut read: Vec<(String, bool)> = Vec::new();
         for symbol in rights.iter().flat_map(|&e| x.symbols_of(e)) {
-            read.extend(self.0.get(&symbol).filter(|strand| strand.of == of).map(|strand| strand.vector.clone()));
+            read.extend(self.of.get(&symbol).filter(|strand| strand.of == of).map(|strand| strand.vector.clone()));
         }
         read.sort();
         read.dedup();
         // Of a source that is a number in some strands the others stand as they are.
-        read.retain(|name| self.whole(name, of).is_some());
-        let vectors: Vec<Vec<Symbol>> = read.iter().filter_map(|name| self.whole(name, of)).collect();
+        read.retain(|name| self.whole.contains_key(name));
+        let vectors: Vec<&[Symbol]> = read.iter().map(|name| &self.whole[name][..]).collect();
         if vectors.is_empty() || of * vectors.len() > MOST {
             return None;
         }
-        let nothing: BTreeMap<Symbol, Expr> = vectors.iter().flatten().map(|&symbol| (symbol, ZERO)).collect();
+        let nothing: BTreeMap<Symbol, Expr> = vectors.iter().copied().flatten().map(|&symbol| (symbol, ZERO)).collect();
         let mut linear = Vec::new();
         let mut left_over = rights.to_vec();
         for symbols in &vectors {
             let mut rows = Vec::new();
             for (row, &right) in rights.iter().enumerate() {
                 let mut entries = Vec::new();
-                for &symbol in symbols {
+                for &symbol in *symbols {
+                    if !x.depends_on(right, symbol) {
+                        entries.push(ZERO);
+                        continue;
+                    }
                     let entry = x.derivative(right, symbol);
                     let entry = x.substitute(entry, &nothing);
                     let entry = if x.is_zero(entry) { ZERO } else { textbook(x, entry) };
@@ -355,17 +326,17 @@ impl Strands {
         &self,
         x: &mut Exprs,
         own: &(String, bool),
-        (mass, vectors): (&[Vec<Expr>], &[Vec<Symbol>]),
+        (mass, vectors): (&[Vec<Expr>], &[&[Symbol]]),
         left_over: &[Expr],
     ) -> Option<Option<(usize, bool)>> {
         if left_over.iter().all(|&e| x.is_zero(e)) {
             return Some(None);
         }
-        let own = self.whole(&(own.0.clone(), false), mass.len()).filter(|_| mass.len() == 3)?;
+        let own = self.whole.get(&(own.0.clone(), false)).filter(|_| mass.len() == 3)?;
         let mut momentum = Vec::new();
         for row in mass {
             let mut terms = Vec::new();
-            for (&entry, &symbol) in row.iter().zip(&own) {
+            for (&entry, &symbol) in row.iter().zip(own) {
                 let symbol = x.sym(symbol);
                 terms.push(x.mul(&[entry, symbol]));
             }
@@ -393,37 +364,6 @@ impl Strands {
             }
         }
         None
-    }
-
-    /// The strands of a vector in their order.
-    fn whole(&self, name: &(String, bool), of: usize) -> Option<Vec<Symbol>> {
-        let mut whole = vec![None; of];
-        for (&symbol, strand) in self.0.iter().filter(|(_, strand)| strand.vector == *name && strand.of == of) {
-            whole[strand.at] = Some(symbol);
-        }
-        whole.into_iter().collect()
-    }
-
-    fn row(&self, x: &mut Exprs, equation: &DisplayEquation, (at, of): (usize, usize)) -> Option<Row> {
-        if x.printed_length(equation.right) > LONGEST {
-            return None;
-        }
-        let own = |x: &Exprs, e: Expr| -> Option<Vec<(Symbol, Strand)>> {
-            let all = x.symbols_of(e).into_iter().filter_map(|symbol| Some((symbol, self.0.get(&symbol)?.clone())));
-            let all: Vec<_> = all.collect();
-            all.iter().all(|(_, strand)| (strand.at, strand.of) == (at, of)).then_some(all)
-        };
-        let [(rate, strand)] = &own(x, equation.left)?[..] else { return None };
-        let (coefficient, rest) = x.linear_in(equation.left, &[*rate])?;
-        if !x.is_zero(rest) || !strand.vector.1 {
-            return None;
-        }
-        let read = own(x, equation.right)?;
-        let symbols: Vec<Symbol> = read.iter().map(|(symbol, _)| *symbol).collect();
-        let (coefficients, rest) = x.linear_in(equation.right, &symbols)?;
-        let rest = textbook(x, rest);
-        let right = read.into_iter().map(|(_, strand)| strand.vector).zip(coefficients).collect();
-        Some(Row { left: (strand.vector.clone(), coefficient[0]), right, rest })
     }
 }
 
