@@ -148,8 +148,9 @@ pub(crate) fn links(
                     let Ok(reader) = values.reader(&parts) else { continue };
                     let weight = reader.values(middle, &[]).map_or(0.0, |v| terms.magnitude(&v));
                     links.push(Link { of, from: Quantity::Number, weight, straight: false });
-                    let slopes =
-                        |at: &[(Symbol, f64)]| moved_by(graph, (scales, settled), &reader, (middle, at), |v| v[0]);
+                    let slopes = |at: &[(Symbol, f64)]| {
+                        made_by(graph, (scales, settled), &reader, (middle, at), |v| v[0], |_| vec![1.0])
+                    };
                     let near = slopes(&[]);
                     let tells = tells(settled, near.iter().copied());
                     let written = is_written_straight(&graph.exprs, right, reader.moves());
@@ -171,7 +172,11 @@ pub(crate) fn links(
                     links.push(Link { of, from, weight, straight });
                     // A modulus that vanishes passes nothing on, but moves with what it reads.
                     let made = |v: &[f64]| quotient(v) * right[middle];
-                    let moved = moved_by(graph, (scales, settled), &reader, (middle, &[]), made);
+                    let weights = |v: &[f64]| match v[..] {
+                        [over, under, ..] => vec![right[middle] / under, -right[middle] * over / (under * under)],
+                        _ => vec![right[middle]],
+                    };
+                    let moved = made_by(graph, (scales, settled), &reader, (middle, &[]), made, weights);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
                 Law::Row { factors, right, of, .. } => {
@@ -185,7 +190,8 @@ pub(crate) fn links(
                         Link { of, from, weight, straight }
                     }));
                     let made = |v: &[f64]| v.iter().zip(&right).map(|(f, (column, _))| f * column[middle]).sum();
-                    let moved = moved_by(graph, (scales, settled), &reader, (middle, &[]), made);
+                    let weights = |_: &[f64]| right.iter().map(|(column, _)| column[middle]).collect();
+                    let moved = made_by(graph, (scales, settled), &reader, (middle, &[]), made, weights);
                     links.extend(moved.into_iter().map(|(from, weight)| Link { of, from, weight, straight: false }));
                 }
                 Law::Sum { .. } | Law::Zero { .. } => {}
@@ -593,6 +599,9 @@ const STRAIGHT: f64 = 0.1;
 /// Terms below this part of the greatest of their sum are lost in it.
 const LOST: f64 = 1e-3;
 
+/// Of so many variables differences tell how steep an expression is in each.
+const FEW: usize = 8;
+
 /// Part of its scale by which a variable is moved to see what changes with it.
 const MOVED: f64 = 1e-6;
 
@@ -608,7 +617,25 @@ pub(crate) fn sensitivities(
     moved_by(graph, (scales, settled), reader, (sample, &[]), of)
 }
 
-/// The same where variables are moved so far.
+/// The same where variables are moved so far. `of` is a sum of what is read, each times a weight, to first order: of many
+/// variables, as a chain of joints has, slopes tell it all at once.
+fn made_by(
+    graph: &BondGraph,
+    (scales, settled): (&Scales, &Settled),
+    reader: &Reader,
+    (sample, from): (usize, &[(Symbol, f64)]),
+    of: impl Fn(&[f64]) -> f64,
+    weights: impl FnOnce(&[f64]) -> Vec<f64>,
+) -> Vec<(Quantity, f64)> {
+    let many = reader.moves().len() > FEW;
+    let Some(slopes) = many.then(|| reader.slopes((sample, from), weights)).flatten() else {
+        return moved_by(graph, (scales, settled), reader, (sample, from), of);
+    };
+    let all = reader.moves().iter().zip(slopes).map(|(&symbol, slope)| (scales.of(graph, symbol), slope.abs()));
+    all.filter(|(quantity, _)| settled.of(*quantity) > 0.0).collect()
+}
+
+/// The same by differences.
 fn moved_by(
     graph: &BondGraph,
     (scales, settled): (&Scales, &Settled),

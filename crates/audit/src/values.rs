@@ -519,7 +519,30 @@ impl Reader<'_, '_> {
         self.values_in(&mut Vec::new(), sample, moved).map(<[f64]>::to_vec)
     }
 
-    /// The same in memory that is used again.
+    /// How steep a sum of the values, each times a weight, is in each of the variables that [move](Self::moves) them, at a
+    /// sample, symbols moved by so much. `weights` gives them from the values. `None` where only differences tell.
+    pub fn slopes(
+        &self,
+        (sample, moved): (usize, &[(Symbol, f64)]),
+        weights: impl FnOnce(&[f64]) -> Vec<f64>,
+    ) -> Option<Vec<f64>> {
+        if !self.rates.is_empty() || self.timed {
+            return None;
+        }
+        let mut room = Vec::new();
+        let weights = weights(self.values_in(&mut room, sample, moved)?);
+        let read = &self.read.get()?.wanted;
+        let by_symbol = read.order.slopes(&room, &weights)?;
+        let mut slopes = vec![0.0; self.moves.len()];
+        for (symbol, slope) in read.order.symbols().iter().zip(by_symbol) {
+            if let Ok(at) = self.moves.binary_search(symbol) {
+                slopes[at] = slope;
+            }
+        }
+        slopes.iter().all(|slope| slope.is_finite()).then_some(slopes)
+    }
+
+    /// The same as [`values`](Self::values) in memory that is used again.
     pub fn values_in<'r>(
         &self,
         room: &'r mut Vec<[f64; 1]>,

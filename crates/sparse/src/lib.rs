@@ -6,7 +6,7 @@ mod matching;
 mod symbolic;
 mod unions;
 
-pub use matching::Matching;
+pub use matching::{Joining, Matching};
 pub use symbolic::{SymbolicFactors, full_operations};
 pub use unions::{Columns, Unions};
 

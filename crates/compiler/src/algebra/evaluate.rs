@@ -144,6 +144,109 @@ impl<'a> EvaluationOrder<'a> {
         self.wanted.iter().for_each(|&at| room.push(room[at]));
         &room[self.order.len()..]
     }
+
+    /// The slopes of the sum of all expressions, each times a weight, by each of the symbols, at the point whose values
+    /// [`values_in`](Self::values_in) has left in `room`: all of them for some times what one evaluation takes. `None` where
+    /// something may have a corner or a jump.
+    ///
+    /// ```
+    /// use halfarrow_compiler::algebra::{EvaluationOrder, Exprs, Facts};
+    /// let mut x = Exprs::default();
+    /// let [a, b] = ["a", "b"].map(|name| x.symbol(name, Facts::default()));
+    /// let [a, b] = [a, b].map(|s| x.sym(s));
+    /// let product = x.mul(&[a, b]);
+    /// let square = x.powi(a, 2);
+    /// let order = EvaluationOrder::new(&x, &[product, square]);
+    /// let mut room = Vec::new();
+    /// order.values_in(&mut room, |k| [[3.0], [4.0]][k]);
+    /// assert_eq!(order.slopes(&room, &[1.0, 10.0]), Some(vec![4.0 + 60.0, 3.0]));
+    /// ```
+    pub fn slopes(&self, room: &[[f64; 1]], weights: &[f64]) -> Option<Vec<f64>> {
+        let mut slopes = vec![0.0; self.order.len()];
+        self.wanted.iter().zip(weights).for_each(|(&at, weight)| slopes[at] += weight);
+        let mut by_symbol = vec![0.0; self.symbols.len()];
+        for (at, evaluated) in self.order.iter().enumerate().rev() {
+            let own = slopes[at];
+            match *evaluated {
+                Evaluated::Number(_) => {}
+                Evaluated::Symbol(k) => by_symbol[k] = own,
+                Evaluated::Node(..) if own == 0.0 => {}
+                Evaluated::Node(node, first) => {
+                    let part = |k: usize| self.parts[first + k] as usize;
+                    self.pass_on(node, own, &|k| room[part(k)][0], room[at][0], &mut |k, slope| {
+                        slopes[part(k)] += slope
+                    })?;
+                }
+            }
+        }
+        Some(by_symbol)
+    }
+
+    /// Passes the slope of a value on to its parts; `at` tells the values of these.
+    fn pass_on(
+        &self,
+        node: &Node,
+        own: f64,
+        at: &dyn Fn(usize) -> f64,
+        value: f64,
+        to: &mut dyn FnMut(usize, f64),
+    ) -> Option<()> {
+        match node {
+            Node::Number(_) | Node::Pi => {}
+            Node::Add(terms) => (0..terms.len()).for_each(|k| to(k, own)),
+            Node::Mul(factors) => {
+                for k in 0..factors.len() {
+                    to(k, (0..factors.len()).filter(|&j| j != k).fold(own, |product, j| product * at(j)));
+                }
+            }
+            Node::Pow(_, n) => {
+                let n = self.pool.is_number(*n)?;
+                let less = n.small().map(|(above, under)| (above - under, under));
+                let [below] = power([at(0)], less, [n.to_f64() - 1.0]);
+                to(0, own * n.to_f64() * below);
+            }
+            Node::Call(f, _) => {
+                let [by_first, by_second] = f.slopes(at(0), || at(1), value)?;
+                to(0, own * by_first);
+                if *f == Function::Atan2 {
+                    to(1, own * by_second);
+                }
+            }
+            Node::Whole(_) => to(0, own),
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+impl Function {
+    /// The slopes by its arguments where it has this value; `None` of functions with corners or jumps.
+    fn slopes(self, x: f64, y: impl FnOnce() -> f64, value: f64) -> Option<[f64; 2]> {
+        let slope = match self {
+            Function::Sin => Function::Cos.value(x, 0.0),
+            Function::Cos => -Function::Sin.value(x, 0.0),
+            Function::Tan => 1.0 + value * value,
+            Function::Asin => 1.0 / (1.0 - x * x).sqrt(),
+            Function::Acos => -1.0 / (1.0 - x * x).sqrt(),
+            Function::Atan => 1.0 / (1.0 + x * x),
+            Function::Atan2 => {
+                let other = y();
+                let square = x * x + other * other;
+                return Some([other / square, -x / square]);
+            }
+            Function::Exp => value,
+            Function::Log => 1.0 / x,
+            Function::Log10 => 1.0 / (x * std::f64::consts::LN_10),
+            Function::Sqrt => 0.5 / value,
+            Function::Sinh => Function::Cosh.value(x, 0.0),
+            Function::Cosh => Function::Sinh.value(x, 0.0),
+            Function::Tanh => 1.0 - value * value,
+            Function::Abs | Function::Sign | Function::Min | Function::Max | Function::Floor | Function::Mod => {
+                return None;
+            }
+        };
+        Some([slope, 0.0])
+    }
 }
 
 /// The place of an expression in an ascending list that holds it.

@@ -34,7 +34,7 @@ pub fn mix(a: u64, b: u64) -> u64 {
 }
 
 /// A random element other than 0, the same for the same key.
-fn random(lane: usize, key: u64) -> u64 {
+pub fn random(lane: usize, key: u64) -> u64 {
     1 + mix(lane as u64 + 0x1a9e, key) % (P - 1)
 }
 

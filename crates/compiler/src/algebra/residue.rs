@@ -3,7 +3,7 @@
 use super::elimination::{Coefficients, NumericPoint, Quality, Zero};
 use super::exprs::Exprs;
 use super::field::{self, P};
-use super::fingerprint::{GENERIC, GIVEN, POISON};
+use super::fingerprint::{GENERIC, GIVEN, LANES, POISON, random};
 use super::node::Expr;
 
 /// The value of an expression in a prime field, where every symbol has a random value. Sums and products of values are
@@ -14,6 +14,11 @@ pub struct Residue(u64);
 impl Residue {
     /// The value of 0.
     pub const ZERO: Residue = Residue(0);
+
+    /// One of the field, by a number: as good as random, and no value of a symbol.
+    pub fn random(key: u64) -> Residue {
+        Residue(random(LANES, key))
+    }
 
     /// Whether it is 0.
     pub fn vanishes(self) -> bool {

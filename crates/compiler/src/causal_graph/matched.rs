@@ -123,7 +123,7 @@ pub(super) fn block_rows(
 }
 
 /// The columns that rows read, ascending, and the rows with columns by their places among these.
-fn numbered(rows: &[&SparseRow]) -> (Vec<usize>, Vec<SparseRow>) {
+pub(super) fn numbered<E: Copy>(rows: &[&SparseRow<E>]) -> (Vec<usize>, Vec<SparseRow<E>>) {
     let mut read: Vec<usize> = rows.iter().flat_map(|row| row.0.iter().map(|e| e.0)).collect();
     read.sort_unstable();
     read.dedup();
@@ -133,7 +133,7 @@ fn numbered(rows: &[&SparseRow]) -> (Vec<usize>, Vec<SparseRow>) {
 }
 
 /// The columns of every cycle of matched rows, those first that others read.
-fn blocks(rows: &[&SparseRow], row_of: &BTreeMap<usize, usize>) -> Vec<Vec<usize>> {
+pub(super) fn blocks<E>(rows: &[&SparseRow<E>], row_of: &BTreeMap<usize, usize>) -> Vec<Vec<usize>> {
     let mut graph = DiGraph::<usize, ()>::new();
     let nodes: BTreeMap<usize, _> = row_of.keys().map(|&column| (column, graph.add_node(column))).collect();
     for (column, &row) in row_of {

@@ -215,7 +215,7 @@ fn is_solved_by_roles(text: &str) -> bool {
 #[test]
 fn roles_of_large_parts_are_those_of_elimination() {
     let mut seen = Seen::default();
-    for seed in 1..4 {
+    for seed in 1..6 {
         let families = [Family::Linear, Family::Nonlinear, Family::Varying, Family::Sensing];
         let sound = |pair: &plain::Graph| is_solved_by_roles(&pair.text());
         let graph = composed(&mut Random::new(seed), &families, 700, sound);
@@ -223,7 +223,8 @@ fn roles_of_large_parts_are_those_of_elimination() {
         compare(&text, seed, &mut seen, |_, _, _, _| CausalityPreferences::default())
             .unwrap_or_else(|why| panic!("seed {seed}: {why}\n{text}"));
     }
-    assert_eq!((seen.parts, seen.by_roles), (3, 3));
+    // Of one the parts are told by pairs of rows and variables, each by itself, but not all together.
+    assert_eq!((seen.parts, seen.by_roles), (5, 4));
 }
 
 /// `GRAPHS=100000 FROM=1 cargo test --workspace --lib -- causal_graph::tests::many --ignored --nocapture`

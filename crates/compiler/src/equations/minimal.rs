@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 use super::definitions::{Definition, Definitions};
 use super::loops::by_gains;
-use super::rows::Rows;
+use super::rows::{Among, Rows};
 use super::{StateKind, Unavailable};
 use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind};
 use crate::bond_graph::{
@@ -41,6 +41,8 @@ pub struct Assembled<'a> {
     /// What changes the stored quantities behind the states.
     pub balances: Vec<Balance>,
     pub(super) deferred: Vec<DeferredRate>,
+    /// Sources that are no constants, as soon as they are looked for.
+    moving: Option<Among>,
 }
 
 /// What changes a stored quantity, or a combination of stored quantities: `quantity' = row`. Written out by
@@ -124,7 +126,7 @@ pub fn assemble<'a>(causal: &'a CausalGraph, momenta: bool) -> Result<Assembled<
         let mut point = start_point(&d.x, graph);
         causal.ports.loops.iter().for_each(|own| by_gains(&mut d, own, &mut rows, &mut point));
     }
-    let mut assembled = Assembled { d, states: Vec::new(), rows, balances: Vec::new(), deferred: Vec::new() };
+    let mut assembled = Assembled::with_rows(d, rows);
     assembled.imposed_and_algebraic(causal);
     assembled.storages(causal, momenta);
     assembled.signals();
@@ -168,9 +170,13 @@ pub(super) fn imposed(x: &mut Exprs, causal: &CausalGraph, state: &PortState) ->
 }
 
 impl<'a> Assembled<'a> {
+    fn with_rows(d: Definitions<'a>, rows: Rows<'a>) -> Self {
+        Assembled { d, states: Vec::new(), rows, balances: Vec::new(), deferred: Vec::new(), moving: None }
+    }
+
     /// Definitions without states yet.
     pub(super) fn empty(d: Definitions<'a>) -> Self {
-        Assembled { d, states: Vec::new(), rows: Rows::none(), balances: Vec::new(), deferred: Vec::new() }
+        Assembled::with_rows(d, Rows::none())
     }
 
     /// Sources, constraints and algebraic laws give their variable.
@@ -443,11 +449,11 @@ impl<'a> Assembled<'a> {
 
     /// Whether a source that is no constant stands in the row of a variable.
     fn is_moved(&mut self, z: Symbol) -> bool {
-        self.rows.inputs_of(&mut self.d.x, z).into_iter().any(|input| {
-            let giver = self.rows.giver(input);
-            giver.is_some_and(|p| matches!(p.role, Role::Source | Role::Redundant))
-                && !self.d.is_constant(self.d.of[&input].expr())
-        })
+        if self.moving.is_none() {
+            let varies = |p: &&PortState| self.d.of.get(&p.input).is_some_and(|of| !self.d.is_constant(of.expr()));
+            self.moving = Some(Among::new(self.rows.sources().filter(varies).map(|p| p.input).collect()));
+        }
+        self.moving.as_mut().is_some_and(|moving| self.rows.is_made_of(&mut self.d.x, z, moving))
     }
 
     /// States are speeds of linear inertances and stored quantities of other storages; rates of dependent ones follow by
@@ -721,8 +727,12 @@ pub(super) fn groups(
         if let Some(previous) = last.insert(storage_port.state.port.element, i) {
             set.union(previous, i);
         }
-        if storage_port.state.role == Role::Dependent {
-            for input in rows.inputs_of(x, storage_port.z) {
+    }
+    let dependent = storage_ports.iter().enumerate().filter(|(_, c)| c.state.role == Role::Dependent);
+    let dependent: Vec<(usize, Symbol)> = dependent.map(|(i, c)| (i, c.z)).collect();
+    if rows.unite(x, &dependent, &index, &mut set).is_none() {
+        for (i, z) in dependent {
+            for input in rows.inputs_of(x, z) {
                 if let Some(&other) = index.get(&input) {
                     set.union(i, other);
                 }

@@ -1,10 +1,9 @@
 //! What stays as it is where a source or the law of a storage jumps: each stored quantity together with those that follow it,
 //! `X + S^T X_d`. Speeds of storages that a source moves do not. Source: `method.md`, 5.4, momentum form.
 
-use rustc_hash::FxHashSet;
-
 use super::definitions::Definitions;
 use super::minimal::{Assembled, StoragePort, groups, imposed, rows_of};
+use super::rows::Among;
 use crate::algebra::{Expr, Symbol};
 use crate::bond_graph::Meaning;
 use crate::causal_graph::{CausalGraph, Combination, PortState, Role};
@@ -27,6 +26,8 @@ impl Assembled<'_> {
         let mut rows = rows_of(&mut self.d, truth);
         let storage_ports: Vec<StoragePort> =
             truth.ports.ports.iter().filter_map(|state| self.storage_port(truth, state)).collect();
+        let moving = rows.sources().filter(|port| is_moving(&mut self.d, truth, port)).map(|port| port.input);
+        let mut moving = Among::new(moving.collect());
         let mut all = Vec::new();
         for (members, speeds) in groups(&mut self.d.x, &storage_ports, &truth.ports.virtual_speeds, &mut rows) {
             let dependent: Vec<&StoragePort> =
@@ -36,10 +37,7 @@ impl Assembled<'_> {
             if dependent.is_empty() && !(jumps && members.iter().any(|&m| self.is_state(storage_ports[m].z))) {
                 continue;
             }
-            let mut inputs = FxHashSet::default();
-            dependent.iter().for_each(|c| inputs.extend(rows.inputs_of(&mut self.d.x, c.z)));
-            let mut givers = inputs.iter().filter_map(|&input| rows.giver(input));
-            let moved = jumps || givers.any(|giver| is_moving(&mut self.d, truth, giver));
+            let moved = jumps || dependent.iter().any(|c| rows.is_made_of(&mut self.d.x, c.z, &mut moving));
             // Else the states tell the storages, whatever form they are in.
             if !moved && members.iter().all(|&m| self.stored_of(&storage_ports[m]).is_some()) {
                 continue;
@@ -68,12 +66,10 @@ impl Assembled<'_> {
     }
 }
 
-/// Whether a port is a source whose value may change.
-fn is_moving(d: &mut Definitions, truth: &CausalGraph, port: &PortState) -> bool {
-    matches!(port.role, Role::Source | Role::Redundant) && {
-        let value = imposed(&mut d.x, truth, port);
-        !d.is_constant(value)
-    }
+/// Whether the value of a source may change.
+fn is_moving(d: &mut Definitions, truth: &CausalGraph, source: &PortState) -> bool {
+    let value = imposed(&mut d.x, truth, source);
+    !d.is_constant(value)
 }
 
 /// Those that can be computed from what is defined.

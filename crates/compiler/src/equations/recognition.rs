@@ -62,10 +62,7 @@ impl Recognition {
             return e;
         }
         let name = name(x);
-        for point in &mut self.points {
-            let value = point.value(x, e);
-            point.known.insert(name, value);
-        }
+        self.points.iter_mut().for_each(|point| point.know(x, name, e));
         self.named.push((name, e));
         let name = x.sym(name);
         self.insert(name, values);
@@ -127,6 +124,17 @@ impl Point {
     pub fn new(x: &Exprs, number: usize, parameters: Parameters, roots: &[Expr], steps: &[EquationStep]) -> Point {
         let known = values_of_steps(x, number, &|s| value_at(x, number, parameters, s), roots, steps);
         Point { number, parameters, known, parts: FxHashMap::default() }
+    }
+
+    /// Whether parameters are as given there.
+    pub fn has_given_parameters(&self) -> bool {
+        self.parameters == Parameters::Given
+    }
+
+    /// A name has the value of an expression from now on.
+    pub fn know(&mut self, x: &Exprs, name: Symbol, e: Expr) {
+        let value = self.value(x, e);
+        self.known.insert(name, value);
     }
 
     /// The value of an expression there.

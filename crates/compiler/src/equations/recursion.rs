@@ -11,7 +11,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fixedbitset::FixedBitSet as Set;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::EquationStep;
@@ -19,14 +18,13 @@ use super::blocks::{FEW, Row, operations};
 use super::definitions::Definitions;
 use super::points::ROUNDING;
 use super::recognition::{Parameters, Point, Recognition};
-use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind, ZERO};
+use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind, ZERO, mix};
 use crate::bond_graph::Meaning;
 
 /// What is written longer than this keeps a name.
 const NAMED: u64 = 3;
-/// Loops with more unknowns are not looked at: which variables lie between an unknown and its equation is found out for
-/// each, at a cost that grows with their number.
-const MOST: usize = 1000;
+/// Where more unknowns than this are left, whether the matrix between them is definite takes too much to find out.
+const MOST_LEFT: usize = 1000;
 /// A part of a machine is cut off by few variables where these are no more: six motions of a body in space, and some of the
 /// joints beside.
 const SHORT: usize = 9;
@@ -70,6 +68,9 @@ pub struct Eliminated {
     pub right: Expr,
 }
 
+/// The points at which a matrix is looked at: it is symmetric anywhere, and definite at the given parameters.
+const PLACES: [(usize, Parameters); 3] = [(0, Parameters::Any), (1, Parameters::Given), (2, Parameters::Given)];
+
 /// A linear form in variables of the loop, by their numbers.
 #[derive(Debug, Clone)]
 struct Form {
@@ -104,9 +105,6 @@ pub fn recursion(
     residuals: &[Expr],
     steps: &[EquationStep],
 ) -> Option<Recursion> {
-    if unknowns.len() > MOST {
-        return None;
-    }
     let short = with_cuts(Cut::Short, d, (unknowns, body, residuals), steps);
     if unknowns.len() > FEW {
         return short;
@@ -152,17 +150,20 @@ fn with_cuts(
     };
     open.depths = open.depths();
     let order = open.levels(duals);
-    let definite = open.is_definite(&roots, steps);
-    if !definite && unknowns.len() > FEW {
-        return None;
-    }
+    // A matrix of few unknowns is looked at before, one of many by the pivots that it turns out to have.
+    let many = (unknowns.len() > FEW).then(|| Products::of(&open, &roots, steps));
+    let definite = many.is_some() || open.is_definite(&roots, steps);
     open.put_in_what_rests();
     if definite {
         open.eliminate(&order, cut)?;
     }
     let all = (open.unknowns..open.symbols.len()).collect();
     open.put_in_all(all, &order)?;
-    open.finish(body)
+    let (rows, left) = open.rows_left();
+    if !many.is_none_or(|products| products.are_of_a_definite_matrix(&open, (&rows, &left))) {
+        return None;
+    }
+    open.finish(body, rows, left)
 }
 
 /// The rate that makes a power with a variable of a bond: that of its other variable.
@@ -232,26 +233,28 @@ impl Open<'_> {
 
     /// Whether the matrix of the unknowns is symmetric, and definite at the given parameters. Rows may have either sign.
     fn is_definite(&self, roots: &[Expr], steps: &[EquationStep]) -> bool {
-        [(0, Parameters::Any), (1, Parameters::Given), (2, Parameters::Given)].into_iter().all(
-            |(number, parameters)| {
-                let mut point = Point::new(self.x, number, parameters, roots, steps);
-                let mut matrix = self.matrix(&mut point);
-                let n = self.unknowns;
-                let sizes: Vec<f64> = (0..n).map(|k| matrix[k * n + k]).collect();
-                for (k, size) in sizes.iter().enumerate() {
-                    (0..n).for_each(|j| matrix[k * n + j] *= size.signum());
-                }
-                is_symmetric(n, &matrix) && (parameters == Parameters::Any || has_positive_pivots(n, matrix))
-            },
-        )
+        PLACES.into_iter().all(|(number, parameters)| {
+            let mut point = Point::new(self.x, number, parameters, roots, steps);
+            let mut matrix = self.matrix(&mut point);
+            let n = self.unknowns;
+            let sizes: Vec<f64> = (0..n).map(|k| matrix[k * n + k]).collect();
+            for (k, size) in sizes.iter().enumerate() {
+                (0..n).for_each(|j| matrix[k * n + j] *= size.signum());
+            }
+            is_symmetric(n, &matrix) && (parameters == Parameters::Any || has_positive_pivots(n, matrix))
+        })
+    }
+
+    /// The coefficients of all forms at a point.
+    fn coefficients(&self, point: &mut Point) -> Vec<Vec<(usize, f64)>> {
+        let value = |(&j, &e): (&usize, &Expr), point: &mut Point| (j, point.value(self.x, e));
+        self.forms.iter().map(|form| form.terms.iter().map(|term| value(term, point)).collect()).collect()
     }
 
     /// What the residuals make of the unknowns, at a point.
     fn matrix(&self, point: &mut Point) -> Vec<f64> {
         let n = self.unknowns;
-        let value = |(&j, &e): (&usize, &Expr), point: &mut Point| (j, point.value(self.x, e));
-        let coefficients: Vec<Vec<(usize, f64)>> =
-            self.forms.iter().map(|form| form.terms.iter().map(|term| value(term, point)).collect()).collect();
+        let coefficients = self.coefficients(point);
         let mut matrix = vec![0.0; n * n];
         let mut values = vec![[0.0; LANES]; self.symbols.len()];
         for first in (0..n).step_by(LANES) {
@@ -299,7 +302,7 @@ impl Open<'_> {
 
     /// Eliminates unknowns where the rest of the loop is cut off, those furthest out first.
     fn eliminate(&mut self, order: &[usize], cut: Cut) -> Option<()> {
-        let mut unknowns: Vec<(usize, usize)> = self.between_all().into_iter().zip(0..).collect();
+        let mut unknowns: Vec<(u32, usize)> = self.between_all().into_iter().zip(0..).collect();
         unknowns.sort_unstable();
         for (_, k) in unknowns {
             let between = self.between(k);
@@ -324,39 +327,55 @@ impl Open<'_> {
     }
 
     /// How many variables there are for each unknown through which its residual reads it.
-    fn between_all(&self) -> Vec<usize> {
+    fn between_all(&self) -> Vec<u32> {
         let (n, all) = (self.unknowns, self.symbols.len());
-        // The unknowns that variables read, and those whose residuals read them.
-        let (mut reads, mut is_read) = (vec![Set::with_capacity(n); all], vec![Set::with_capacity(n); all]);
-        for k in 0..n {
-            reads[k].insert(k);
-            is_read[k].insert(k);
-        }
-        for k in n..all {
-            let mut set = std::mem::take(&mut reads[k]);
-            self.forms[k].terms.keys().for_each(|&j| set.union_with(&reads[j]));
-            reads[k] = set;
-        }
         let mut count = vec![0; n];
-        for k in (n..all).rev() {
-            let mut set = std::mem::take(&mut is_read[k]);
-            self.readers[k].iter().for_each(|&j| set.union_with(&is_read[j]));
-            set.intersection(&reads[k]).for_each(|unknown| count[unknown] += 1);
-            is_read[k] = set;
+        // Of as many unknowns at once as a number has bits: those that variables read, and those whose residuals read them.
+        let (mut reads, mut is_read) = (vec![0u64; all], vec![0u64; all]);
+        for first in (0..n).step_by(64) {
+            let own = first..n.min(first + 64);
+            for set in [&mut reads, &mut is_read] {
+                set[..n].fill(0);
+                own.clone().for_each(|k| set[k] = 1 << (k - first));
+            }
+            for k in n..all {
+                reads[k] = self.forms[k].terms.keys().fold(0, |set, &j| set | reads[j]);
+            }
+            for k in (n..all).rev() {
+                is_read[k] = self.readers[k].iter().fold(0, |set, &j| set | is_read[j]);
+                let mut both = is_read[k] & reads[k];
+                while both != 0 {
+                    count[first + both.trailing_zeros() as usize] += 1;
+                    both &= both - 1;
+                }
+            }
         }
         count
     }
 
     /// The variables through which the residual of an unknown reads the unknown.
+    ///
+    /// In a chain what reads the unknown goes all the way to one end, as does what the residual reads, and few variables are
+    /// both: they are looked for from both sides at once, until one side has come to its end.
     fn between(&self, k: usize) -> BTreeSet<usize> {
         let reading = |j: usize| self.readers[j].iter().copied().filter(|&j| j >= self.unknowns);
-        let Some(least) = reading(k).map(|j| self.depths[j]).min() else { return BTreeSet::new() };
-        // What is less deep than all that read the unknown does not read it.
-        let read =
-            |j: usize| self.forms[j].terms.keys().copied().filter(|&j| j >= self.unknowns && self.depths[j] >= least);
-        let below = reached(k, |j, found| found.extend(read(j)));
-        let found = reached(k, |j, found| found.extend(reading(j).filter(|j| below.contains(j))));
-        found.into_iter().collect()
+        let read = |j: usize| self.forms[j].terms.keys().copied().filter(|&j| j >= self.unknowns);
+        let least = reading(k).map(|j| self.depths[j]).min();
+        let most = read(k).map(|j| self.depths[j]).max();
+        let (Some(least), Some(most)) = (least, most) else { return BTreeSet::new() };
+        // What is less deep than all that read the unknown does not read it, and what is deeper than all that the residual
+        // reads is not read by it.
+        let reading = |j: usize, found: &mut Vec<usize>| found.extend(reading(j).filter(|&j| self.depths[j] <= most));
+        let read = |j: usize, found: &mut Vec<usize>| found.extend(read(j).filter(|&j| self.depths[j] >= least));
+        let (mut above, mut below) = (Reached::from(k), Reached::from(k));
+        loop {
+            if !above.step(reading) {
+                return Reached::from(k).within(&above, read);
+            }
+            if !below.step(read) {
+                return Reached::from(k).within(&below, reading);
+            }
+        }
     }
 
     /// How many other variables the residual of an unknown reads through these.
@@ -509,7 +528,8 @@ impl Open<'_> {
         self.x.add(&sum)
     }
 
-    fn finish(mut self, body: &[(Symbol, Expr)]) -> Option<Recursion> {
+    /// The equations between the unknowns that are left, and these.
+    fn rows_left(&mut self) -> (Vec<Row>, Vec<usize>) {
         let left: Vec<usize> = (0..self.unknowns).filter(|&k| !self.gone[k]).collect();
         let mut rows = Vec::with_capacity(left.len());
         for &k in &left {
@@ -518,6 +538,10 @@ impl Open<'_> {
             let place = |j: &usize| left.binary_search(j).expect("only these are left");
             rows.push((form.terms.iter().map(|(j, &e)| (place(j), e)).collect(), form.rest));
         }
+        (rows, left)
+    }
+
+    fn finish(mut self, body: &[(Symbol, Expr)], rows: Vec<Row>, left: Vec<usize>) -> Option<Recursion> {
         let mut values: Vec<(Symbol, Expr)> = Vec::with_capacity(self.eliminated.len() + body.len());
         for k in (0..self.unknowns).filter(|&k| self.gone[k]).collect::<Vec<_>>() {
             let own = self.symbols[k];
@@ -531,14 +555,130 @@ impl Open<'_> {
     }
 }
 
-/// All that is reached from somewhere.
-fn reached(from: usize, mut next: impl FnMut(usize, &mut Vec<usize>)) -> FxHashSet<usize> {
-    let (mut seen, mut open, mut found) = (FxHashSet::default(), vec![from], Vec::new());
-    while let Some(k) = open.pop() {
-        next(k, &mut found);
-        open.extend(found.drain(..).filter(|&j| seen.insert(j)));
+/// The matrix of many unknowns at a few points, as the forms that make it up: it has as many entries as there are pairs of
+/// unknowns, its products with vectors take no more than the forms.
+struct Products {
+    points: Vec<(Point, Vec<Vec<(usize, f64)>>)>,
+}
+
+impl Products {
+    fn of(open: &Open, roots: &[Expr], steps: &[EquationStep]) -> Products {
+        let at = |(number, parameters)| {
+            let mut point = Point::new(open.x, number, parameters, roots, steps);
+            let coefficients = open.coefficients(&mut point);
+            (point, coefficients)
+        };
+        Products { points: PLACES.into_iter().map(at).collect() }
     }
-    seen
+
+    /// Whether the matrix is symmetric, and definite at the given parameters, by the pivots of the unknowns that were
+    /// eliminated and the rows between those that are left. Rows may have either sign, which is that of their pivot: all
+    /// pivots are positive then, and a symmetric matrix that has such pivots in any order is definite.
+    fn are_of_a_definite_matrix(mut self, open: &Open, (rows, left): (&[Row], &[usize])) -> bool {
+        if left.len() > MOST_LEFT {
+            return false;
+        }
+        let (x, n) = (&*open.x, open.unknowns);
+        let number_of: FxHashMap<Symbol, usize> = open.symbols[..n].iter().copied().zip(0..).collect();
+        let mut all_signs: Option<Vec<f64>> = None;
+        for (point, _) in self.points.iter_mut().filter(|p| p.0.has_given_parameters()) {
+            open.recognition.named.iter().for_each(|&(name, e)| point.know(x, name, e));
+            let mut signs = vec![1.0; n];
+            for eliminated in &open.eliminated {
+                let pivot = point.value(x, eliminated.pivot);
+                if !(pivot.is_finite() && pivot != 0.0) {
+                    return false;
+                }
+                signs[number_of[&eliminated.unknown]] = pivot.signum();
+            }
+            let mut matrix = vec![0.0; left.len() * left.len()];
+            for (i, (row, _)) in rows.iter().enumerate() {
+                row.iter().for_each(|&(j, e)| matrix[i * left.len() + j] = point.value(x, e));
+                let sign = matrix[i * left.len() + i].signum();
+                matrix[i * left.len()..(i + 1) * left.len()].iter_mut().for_each(|e| *e *= sign);
+                signs[left[i]] = sign;
+            }
+            if !has_positive_pivots(left.len(), matrix) || all_signs.as_ref().is_some_and(|all| *all != signs) {
+                return false;
+            }
+            all_signs = Some(signs);
+        }
+        let signs = all_signs.expect("parameters are given at some of the points");
+        self.points
+            .iter()
+            .zip(0..)
+            .all(|((_, coefficients), number)| is_symmetric_by_products(coefficients, &signs, number))
+    }
+}
+
+/// Whether a matrix, given by what its forms make of each other, is symmetric where its rows have these signs: its products
+/// with a vector from either side are the same.
+fn is_symmetric_by_products(coefficients: &[Vec<(usize, f64)>], signs: &[f64], number: u64) -> bool {
+    let (n, all) = (signs.len(), coefficients.len());
+    let vector: Vec<f64> = (0..n).map(|k| entry(number, k)).collect();
+    // From the right, with what rounding is measured by.
+    let mut values: Vec<(f64, f64)> = vector.iter().map(|&v| (v, v)).collect();
+    values.resize(all, (0.0, 0.0));
+    let sum = |values: &[(f64, f64)], k: usize| {
+        coefficients[k]
+            .iter()
+            .fold((0.0, 0.0), |(sum, size), &(j, e)| (sum + e * values[j].0, size + (e * values[j].1).abs()))
+    };
+    (n..all).for_each(|k| values[k] = sum(&values, k));
+    let right: Vec<(f64, f64)> = (0..n).map(|k| sum(&values, k)).collect();
+    // From the left: what each variable counts for in all residuals.
+    let mut weights: Vec<(f64, f64)> = vec![(0.0, 0.0); all];
+    let spread = |weights: &mut [(f64, f64)], k: usize, (own, size): (f64, f64)| {
+        for &(j, e) in &coefficients[k] {
+            weights[j].0 += e * own;
+            weights[j].1 += (e * size).abs();
+        }
+    };
+    (0..n).for_each(|k| spread(&mut weights, k, (signs[k] * vector[k], vector[k])));
+    for k in (n..all).rev() {
+        let own = weights[k];
+        spread(&mut weights, k, own);
+    }
+    (0..n).all(|k| {
+        let difference = signs[k] * right[k].0 - weights[k].0;
+        difference.abs() <= ROUNDING * (right[k].1 + weights[k].1)
+    })
+}
+
+/// An entry of a vector that is as good as random, between 1 and 2.
+fn entry(number: u64, k: usize) -> f64 {
+    f64::from_bits(1.0f64.to_bits() | (mix(number + 0x5e3d, k as u64) >> 12))
+}
+
+/// What is reached from somewhere, step by step.
+struct Reached {
+    seen: FxHashSet<usize>,
+    open: Vec<usize>,
+    found: Vec<usize>,
+}
+
+impl Reached {
+    fn from(start: usize) -> Reached {
+        Reached { seen: FxHashSet::default(), open: vec![start], found: Vec::new() }
+    }
+
+    /// Goes on from one that was reached; whether there was one left.
+    fn step(&mut self, next: impl FnOnce(usize, &mut Vec<usize>)) -> bool {
+        let Some(from) = self.open.pop() else { return false };
+        next(from, &mut self.found);
+        self.open.extend(self.found.drain(..).filter(|&j| self.seen.insert(j)));
+        true
+    }
+
+    /// All that is reached by what another search has reached.
+    fn within(mut self, other: &Reached, next: impl Fn(usize, &mut Vec<usize>)) -> BTreeSet<usize> {
+        let next = |from: usize, found: &mut Vec<usize>| {
+            next(from, found);
+            found.retain(|j| other.seen.contains(j));
+        };
+        while self.step(next) {}
+        self.seen.into_iter().collect()
+    }
 }
 
 /// Definitions, each behind those that it reads; `None` if they read each other.

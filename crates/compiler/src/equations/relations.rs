@@ -28,6 +28,8 @@ pub struct Relations {
 
 /// Terms of rows that are written out at most.
 const TERMS: usize = 100_000;
+/// And of rows on the way to them.
+const TERMS_ON_THE_WAY: usize = 10 * TERMS;
 
 /// One row: `Σ factor · quantity' = Σ coefficient · drive`.
 #[derive(Debug, Clone)]
@@ -77,9 +79,10 @@ pub(super) fn relations(assembled: &mut Assembled, causal: &CausalGraph) -> Rela
 
 /// Whether the rows of these states are too long to be written out.
 fn are_long(assembled: &mut Assembled, ports: &Ports, states: &[&Chosen]) -> bool {
-    let mut terms = 0;
+    let (mut terms, mut on_the_way) = (0, TERMS_ON_THE_WAY);
     states.iter().filter_map(|state| ports.rate_of(state)).any(|rate| {
-        terms += assembled.rows.inputs_of(&mut assembled.d.x, rate).len();
+        let row = assembled.rows.inputs_within(&mut assembled.d.x, rate, &mut on_the_way);
+        terms += row.map_or(TERMS + 1, |row| row.len());
         terms > TERMS
     })
 }

@@ -9,6 +9,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use petgraph::unionfind::UnionFind;
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use crate::algebra::{Expr, Exprs, ONE, Residue, Symbol};
 use crate::bond_graph::{BondGraph, Kind, Meaning, ResistorLaw, StorageLaw};
 use crate::causal_graph::{CausalGraph, Combination, PortState, Ports, Role, stays};
@@ -81,9 +84,10 @@ impl<'a> Rows<'a> {
         self.cancelling.contains(&symbol)
     }
 
-    /// The port that gives a variable.
-    pub fn giver(&self, input: Symbol) -> Option<&'a PortState> {
-        self.givers.get(&input).copied()
+    /// The ports that impose a variable.
+    pub fn sources(&self) -> impl Iterator<Item = &'a PortState> + use<'a> {
+        let all = self.ports.map_or(&[][..], |ports| &ports.ports);
+        all.iter().filter(|p| matches!(p.role, Role::Source | Role::Redundant))
     }
 
     /// A variable of the junction structure over what elements give; `None` if the structure says nothing of it.
@@ -155,19 +159,93 @@ impl<'a> Rows<'a> {
 
     /// What elements give of which a variable of the junction structure is made; nothing of other variables.
     pub fn inputs_of(&mut self, x: &mut Exprs, symbol: Symbol) -> Vec<Symbol> {
-        let Some(ports) = self.ports else { return Vec::new() };
+        self.inputs_within(x, symbol, &mut { usize::MAX }).expect("there is no bound to it")
+    }
+
+    /// The same, as long as rows on the way have no more terms than a bound, which what is found is taken off.
+    pub fn inputs_within(&mut self, x: &mut Exprs, symbol: Symbol, terms: &mut usize) -> Option<Vec<Symbol>> {
+        let Some(ports) = self.ports else { return Some(Vec::new()) };
         let mut open = vec![symbol];
         while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| self.residues.contains_key(s)) {
             let mut row = put_in(x, definition, &self.residues);
             row.retain(|t| !t.1.is_some_and(Residue::vanishes));
+            *terms = terms.checked_sub(row.len())?;
             self.residues.insert(next, row);
         }
         let row = self.residues.get(&symbol).map_or(&[][..], |row| row);
         let open = |t: &(Symbol, Option<Residue>)| t.1.is_none() || ports.undetermined.contains(&t.0);
         if row.iter().any(open) {
-            return self.of(x, symbol).map_or(Vec::new(), |row| row.0.iter().map(|t| t.0).collect());
+            return Some(self.of(x, symbol).map_or(Vec::new(), |row| row.0.iter().map(|t| t.0).collect()));
         }
-        row.iter().map(|t| t.0).collect()
+        Some(row.iter().map(|t| t.0).collect())
+    }
+
+    /// Whether a variable is made of any of some inputs. No row is written out over the others.
+    pub fn is_made_of(&mut self, x: &mut Exprs, symbol: Symbol, among: &mut Among) -> bool {
+        let Some(ports) = self.ports.filter(|_| !among.inputs.is_empty()) else { return false };
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| among.rows.contains_key(s)) {
+            let mut row = put_in(x, definition, &among.rows);
+            row.retain(|t| !t.1.is_some_and(Residue::vanishes) && self.tells(ports, t.0, among));
+            among.rows.insert(next, row);
+        }
+        let own = [(symbol, None)];
+        let row = among.rows.get(&symbol).map_or(&own[..], |row| row);
+        if row.iter().any(|t| ports.undetermined.contains(&t.0) || t.1.is_none() && t.0 != symbol) {
+            return self.inputs_of(x, symbol).iter().any(|input| among.inputs.contains(input));
+        }
+        row.iter().any(|t| among.inputs.contains(&t.0) && !self.zero.contains(&t.0))
+    }
+
+    fn tells(&self, ports: &Ports, symbol: Symbol, among: &Among) -> bool {
+        !self.zero.contains(&symbol) && (among.inputs.contains(&symbol) || ports.undetermined.contains(&symbol))
+    }
+
+    /// Unites each of some variables with the inputs that it is made of, where these have a place in `sets`; `None` where only
+    /// written rows tell them, with some united already.
+    ///
+    /// What counts is which sets of inputs a variable is made of, so that a row has one term for each set: its coefficients
+    /// times random numbers, whose sum vanishes only if all of them do. A chain of bodies has short rows then.
+    pub fn unite(
+        &self,
+        x: &Exprs,
+        variables: &[(usize, Symbol)],
+        places: &FxHashMap<Symbol, usize>,
+        sets: &mut UnionFind<usize>,
+    ) -> Option<()> {
+        let Some(ports) = self.ports else { return Some(()) };
+        let mut known: Map<Symbol, Vec<(usize, Residue)>> = Map::new();
+        // What others read comes first, so that its inputs are one set by then.
+        for (place, symbol) in by_depth(ports, variables) {
+            let mut open = vec![symbol];
+            while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| known.contains_key(s)) {
+                let mut row = Vec::new();
+                for &(s, c) in definition.0.iter().filter(|t| !self.zero.contains(&t.0)) {
+                    let factor = x.residue(c).filter(|_| !ports.undetermined.contains(&s))?;
+                    match (known.get(&s), places.get(&s)) {
+                        (Some(read), _) => row.extend(read.iter().map(|&(set, c)| (sets.find(set), factor * c))),
+                        (None, Some(&input)) => row.push((sets.find(input), factor * Residue::random(input as u64))),
+                        (None, None) => {}
+                    }
+                }
+                row.sort_unstable_by_key(|t| t.0);
+                row.dedup_by(|next, sum| {
+                    let same = next.0 == sum.0;
+                    if same {
+                        sum.1 = sum.1 + next.1;
+                    }
+                    same
+                });
+                row.retain(|t| !t.1.vanishes());
+                known.insert(next, row);
+            }
+            match (known.get(&symbol), places.get(&symbol)) {
+                (Some(row), _) => row.iter().for_each(|&(set, _)| _ = sets.union(place, set)),
+                (None, Some(&input)) if !self.zero.contains(&symbol) => _ = sets.union(place, input),
+                _ => {}
+            }
+        }
+        Some(())
     }
 
     /// Which of these sums of variables may be put together so that no input is left, whatever their factors.
@@ -298,6 +376,37 @@ fn without_own_columns<C>(rows: &[Vec<C>], columns: usize, number: impl Fn(&C) -
         }
     }
     left
+}
+
+/// Inputs that are looked for in variables, with what is known of these.
+#[derive(Default)]
+pub struct Among {
+    inputs: FxHashSet<Symbol>,
+    /// Rows over these inputs alone.
+    rows: Map<Symbol, Row>,
+}
+
+impl Among {
+    /// These are looked for.
+    pub fn new(inputs: FxHashSet<Symbol>) -> Among {
+        Among { inputs, rows: Map::new() }
+    }
+}
+
+/// Variables, those first that are the fewest definitions away from what elements give.
+fn by_depth(ports: &Ports, variables: &[(usize, Symbol)]) -> Vec<(usize, Symbol)> {
+    let mut depths: Map<Symbol, u32> = Map::new();
+    for &(_, symbol) in variables {
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| depths.contains_key(s)) {
+            let below = definition.0.iter().filter_map(|t| depths.get(&t.0)).max();
+            let depth = 1 + below.copied().unwrap_or(0);
+            depths.insert(next, depth);
+        }
+    }
+    let mut ordered = variables.to_vec();
+    ordered.sort_by_key(|v| depths.get(&v.1).copied().unwrap_or(0));
+    ordered
 }
 
 /// A row with its coefficients in a prime field; `None` where one has no value there.

@@ -31,12 +31,15 @@ impl<'a> Dataflow<'a> {
     pub fn live_but_for(self, wanted: &[Value], deep: bool, given: &FxHashSet<Value>) -> Vec<bool> {
         let mut live = vec![false; self.values.len()];
         wanted.iter().for_each(|v| live[v.index()] = true);
+        // A large block is read by as many values as it has unknowns.
+        let mut seen = vec![false; self.blocks.len()];
         for (value, op) in self.values.iter().rev() {
             let ends = (!deep && self.values.reads(value) == Reads::PARAMETERS) || given.contains(&value);
             if !live[value.index()] || ends {
                 continue;
             }
             match op {
+                Op::Solution(block, _) if std::mem::replace(&mut seen[block.index()], true) => {}
                 Op::Solution(block, _) => self.blocks[block].reads().for_each(|v| live[v.index()] = true),
                 Op::Parameter(i) => live[self.parameters[i as usize].default.index()] = true,
                 _ => op.for_each_operand(|v| live[v.index()] = true),
