@@ -1,12 +1,13 @@
 //! Derivatives and substitution.
 
+use super::evaluate::EvaluationOrder;
 use super::exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 use super::fingerprint::POISON;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::table::TableId;
 use crate::ids::Id;
 use rustc_hash::FxHashMap;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// What a derivative is taken by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -126,13 +127,15 @@ impl Exprs {
     /// assert_eq!(x.without_idle(&[sum], &|s| s == phi), [x.powi(a, 2)]);
     /// ```
     pub fn without_idle(&mut self, roots: &[Expr], may_go: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
-        let symbols: BTreeSet<Symbol> = roots.iter().flat_map(|&e| self.symbols_of(e)).filter(|&s| may_go(s)).collect();
+        let mut hardly_moved = EvaluationOrder::new(self, roots).hardly_moved(may_go);
+        hardly_moved.sort_unstable_by_key(|moved| moved.0);
         let mut idle: Vec<Vec<Symbol>> = vec![Vec::new(); roots.len()];
-        for symbol in symbols {
-            let at = self.substitute_all(roots, &BTreeMap::from([(symbol, ZERO)]));
-            for ((&root, value), idle) in roots.iter().zip(at).zip(&mut idle) {
+        for (symbol, members) in hardly_moved {
+            let own: Vec<Expr> = members.iter().map(|&i| roots[i]).collect();
+            let at = self.substitute_all(&own, &BTreeMap::from([(symbol, ZERO)]));
+            for (i, (root, value)) in members.into_iter().zip(own.into_iter().zip(at)) {
                 if value != root && self.has_value_of(value, root) {
-                    idle.push(symbol);
+                    idle[i].push(symbol);
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! Values in floating point.
 
 use super::exprs::Exprs;
+use super::fingerprint::mix;
 use super::math;
 use super::node::{Expr, Function, Node, Symbol};
 use rustc_hash::FxHashMap;
@@ -80,6 +81,16 @@ pub struct EvaluationOrder<'a> {
     wanted: Vec<usize>,
 }
 
+/// As many symbols are moved together.
+const LANES: usize = 8;
+/// Values that differ by more than this part of them are different.
+const CLEARLY: f64 = 1e-6;
+
+/// A value between 1 and 2, as good as random: that of a symbol at the point of this number.
+pub fn somewhere(number: u64, symbol: Symbol) -> f64 {
+    f64::from_bits(1.0f64.to_bits() | (mix(number + 0x51de, u64::from(symbol.0)) >> 12))
+}
+
 /// How a value comes about.
 #[derive(Debug, Clone)]
 enum Evaluated<'a> {
@@ -143,6 +154,47 @@ impl<'a> EvaluationOrder<'a> {
         }
         self.wanted.iter().for_each(|&at| room.push(room[at]));
         &room[self.order.len()..]
+    }
+
+    /// For each symbol that `may_go` the expressions in which it stands though their values hardly differ where it has another
+    /// value: all others depend on it. A few symbols are looked at together.
+    pub fn hardly_moved(&self, may_go: &dyn Fn(Symbol) -> bool) -> Vec<(Symbol, Vec<usize>)> {
+        let (mut room, mut reads) = (Vec::new(), vec![0u8; self.order.len()]);
+        let anywhere: Vec<f64> = self.symbols.iter().map(|&symbol| somewhere(0, symbol)).collect();
+        self.values_in(&mut room, |k| [anywhere[k]]);
+        let here: Vec<f64> = self.wanted.iter().map(|&at| room[at][0]).collect();
+        let symbols: Vec<usize> = (0..self.symbols.len()).filter(|&k| may_go(self.symbols[k])).collect();
+        let mut found = Vec::with_capacity(symbols.len());
+        let mut lanes = Vec::new();
+        for together in symbols.chunks(LANES) {
+            let lane_of = |k: usize| together.binary_search(&k).ok();
+            let there = self.values_in(&mut lanes, |k| {
+                let mut values = [anywhere[k]; LANES];
+                lane_of(k).into_iter().for_each(|lane| values[lane] = somewhere(1, self.symbols[k]));
+                values
+            });
+            for (at, evaluated) in self.order.iter().enumerate() {
+                reads[at] = match *evaluated {
+                    Evaluated::Number(_) => 0,
+                    Evaluated::Symbol(k) => lane_of(k).map_or(0, |lane| 1 << lane),
+                    Evaluated::Node(node, first) => {
+                        let mut parts = first..;
+                        let mut all = 0;
+                        node.for_each_child(|_| all |= parts.next().map_or(0, |k| reads[self.parts[k] as usize]));
+                        all
+                    }
+                };
+            }
+            for (lane, &k) in together.iter().enumerate() {
+                let is_near = |e: usize| {
+                    let (one, other) = (here[e], there[e][lane]);
+                    let apart = (one - other).abs() > CLEARLY * (one.abs() + other.abs());
+                    reads[self.wanted[e]] >> lane & 1 == 1 && !apart
+                };
+                found.push((self.symbols[k], (0..self.wanted.len()).filter(|&e| is_near(e)).collect()));
+            }
+        }
+        found
     }
 
     /// The slopes of the sum of all expressions, each times a weight, by each of the symbols, at the point whose values

@@ -43,7 +43,7 @@ pub use elimination::{
     back_substitute, eliminate,
 };
 pub use estimate::{Estimate, Estimates};
-pub use evaluate::{EvaluationOrder, Evaluator};
+pub use evaluate::{EvaluationOrder, Evaluator, somewhere};
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
 pub(crate) use fingerprint::mix;
 pub use lowest_terms::LowestTerms;

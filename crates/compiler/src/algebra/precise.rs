@@ -4,7 +4,7 @@ use super::exprs::Exprs;
 use super::math;
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::rational::Rational;
-use astro_float_num::{BigFloat, Consts, Radix, RoundingMode, Sign};
+use astro_float_num::{BigFloat, Consts, Radix, RoundingMode, Sign, Word};
 use rustc_hash::FxHashMap;
 use std::sync::MutexGuard;
 
@@ -122,7 +122,10 @@ impl Real for BigFloat {
         } else if self.is_zero() {
             f64::NEG_INFINITY
         } else {
-            self.exponent().map_or(f64::NAN, f64::from)
+            // The mantissa is at least a half and less than 1; of a chain of products nothing may be given away.
+            let top = self.mantissa_digits().and_then(|digits| digits.last().copied());
+            let mantissa = top.map_or(0.0, |top| math::log2((top as f64 + 1.0) / 2f64.powi(Word::BITS as i32)));
+            self.exponent().map_or(f64::NAN, |exponent| f64::from(exponent) + mantissa)
         }
     }
     fn negative(&self) -> bool {
@@ -354,14 +357,18 @@ fn times_minus_one<R: Real>(x: &Approximate<R>, constants: &mut Consts) -> R {
 
 /// The logarithm of the sum of two bounds.
 fn both(a: f64, b: f64) -> f64 {
-    let greater = a.max(b);
-    if greater == f64::NEG_INFINITY { greater } else { greater + 1.0 }
+    let (greater, less) = (a.max(b), a.min(b));
+    match less - greater {
+        _ if greater == f64::NEG_INFINITY || less == f64::NEG_INFINITY => greater,
+        apart if apart < -40.0 => greater + 1e-11,
+        // 2^x is no more than the straight line between two whole x.
+        apart => greater + math::log2(1.0 + (1.0 + apart - apart.floor()) * 2f64.powi(apart.floor() as i32)) + 1e-13,
+    }
 }
 
 /// With the error of one more rounding.
 fn rounded<R: Real>(value: R, error: f64) -> Approximate<R> {
-    let own = value.size() - R::BITS;
-    let error = if own == f64::NEG_INFINITY { error } else { error.max(own) + 0.1 };
+    let error = both(error, value.size() - R::BITS);
     Approximate { value, error }
 }
 

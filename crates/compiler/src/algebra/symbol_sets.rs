@@ -11,8 +11,10 @@ use smallvec::SmallVec;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct SetId(u32);
 
-/// Larger sets are not kept but found by walking the expression.
+/// Larger sets are not kept but found by walking the expression, down to what is taken as a whole: of that sets are kept up to
+/// a larger size, as an entry of a rotation reads all joints on the way to its body.
 const LARGEST: usize = 48;
+const LARGEST_OF_WHOLE: usize = 4096;
 /// Unions of so many symbols are made again and again: looking for them costs as much.
 const SMALL: usize = 8;
 const EMPTY: SetId = SetId(0);
@@ -65,10 +67,10 @@ impl SymbolSets {
         SetId(SINGLES + symbol.0)
     }
 
-    fn intern(&mut self, symbols: &[Symbol]) -> SetId {
+    fn intern(&mut self, symbols: &[Symbol], largest: usize) -> SetId {
         match symbols {
             &[symbol] => return self.single(symbol),
-            _ if symbols.len() > LARGEST => return LARGE,
+            _ if symbols.len() > largest => return LARGE,
             _ => {}
         }
         let SymbolSets { members: all, ends, ids, .. } = self;
@@ -93,7 +95,7 @@ impl SymbolSets {
         if a == LARGE || b == LARGE {
             return LARGE;
         }
-        if self.len(a) + self.len(b) <= SMALL {
+        if self.len(a) + self.len(b) <= SMALL || self.len(a).max(self.len(b)) > LARGEST {
             return self.union_of([a, b].into_iter());
         }
         let key = if a.0 < b.0 { (a, b) } else { (b, a) };
@@ -105,18 +107,24 @@ impl SymbolSets {
         id
     }
 
-    /// The union of several sets at once, so that no set on the way to it is kept.
+    /// The union of several sets at once, so that no set on the way to it is kept; a long one where it has the others.
     fn union_of(&mut self, sets: impl Iterator<Item = SetId>) -> SetId {
         let mut all: SmallVec<[Symbol; 16]> = SmallVec::new();
+        let mut long = EMPTY;
         for set in sets {
             match self.get(set) {
-                Some(symbols) => all.extend_from_slice(symbols),
-                None => return LARGE,
+                Some(symbols) if symbols.len() <= LARGEST => all.extend_from_slice(symbols),
+                Some(_) if long == EMPTY || long == set => long = set,
+                _ => return LARGE,
             }
         }
         all.sort_unstable();
         all.dedup();
-        self.intern(&all)
+        match self.get(long).filter(|long| !long.is_empty()) {
+            Some(long_symbols) if all.iter().all(|s| long_symbols.binary_search(s).is_ok()) => long,
+            Some(_) => LARGE,
+            None => self.intern(&all, LARGEST),
+        }
     }
 }
 
@@ -159,6 +167,12 @@ impl Exprs {
     pub(super) fn symbols_of_node(&mut self, node: &Node) -> SetId {
         if let Node::Symbol(s) = node {
             return self.sets.single(*s);
+        }
+        if let Node::Whole(part) = node
+            && self.entry(*part).symbols == LARGE
+        {
+            let symbols = self.symbols_of(*part);
+            return self.sets.intern(&symbols, LARGEST_OF_WHOLE);
         }
         let (entries, sets) = (&self.entries, &mut self.sets);
         let of = |e: Expr| entries[e.0 as usize].symbols;

@@ -4,15 +4,25 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{BondGraph, Constraint, HeldKind, Kind, Meaning, StorageLaw};
-use crate::algebra::{Expr, Exprs, Node, ONE, SparseRow, Symbol, ZERO, back_substitute, eliminate};
+use crate::algebra::{
+    EvaluationOrder, Evaluator, Expr, Exprs, Node, ONE, SparseRow, Symbol, ZERO, back_substitute, eliminate, somewhere,
+};
 use crate::sparse::Matching;
 
 /// Parts with more flows than this are searched for rows that are one too many by their structure alone.
 const LARGE: usize = 600;
 /// Parts in which more flows and rates are left then are not searched.
 const MOST: usize = 2000;
-/// Relations of a part with more rates than this are not tested for being integrable together.
+/// Relations of a part with more rates than this are tested for being integrable together by values alone,
 const TESTED: usize = 24;
+/// and with more than this not at all.
+const TESTED_BY_VALUES: usize = 400;
+/// Points at which they are tested by values.
+const POINTS: u64 = 3;
+/// A sum above this part of its terms does not vanish,
+const CLEARLY: f64 = 1e-5;
+/// and one below this part at all points does.
+const ROUNDING: f64 = 1e-9;
 
 /// A relation between the rates of positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -374,20 +384,29 @@ fn in_lowest_terms(x: &mut Exprs, e: Expr) -> Option<Expr> {
 
 /// A relation as it stands, or multiplied by what makes a differential of it with a closed form, if there is one.
 fn closed(x: &mut Exprs, graph: &BondGraph, terms: &[(Symbol, Expr)]) -> Option<VelocityRelation> {
-    let factors: Vec<Expr> = std::iter::once(ONE)
-        .chain(
-            terms.iter().map(|t| t.1).filter(|&e| !is_fixed(x, e)).collect::<Vec<_>>().into_iter().map(|e| x.recip(e)),
-        )
-        .collect();
-    for factor in factors {
+    let all: Vec<Symbol> = coordinates(x, graph, [terms]).into_iter().collect();
+    let points: Option<Vec<FormAt>> = (0..POINTS).map(|number| FormAt::new(x, &all, terms, number)).collect();
+    let divisors = terms.iter().filter(|t| !is_fixed(x, t.1)).map(|&t| Some(t)).collect::<Vec<_>>();
+    for divisor in std::iter::once(None).chain(divisors) {
+        // What is no differential is mostly told by values.
+        let place = divisor.and_then(|(symbol, _)| all.binary_search(&symbol).ok());
+        let told = points.iter().flatten().try_fold(true, |exact, point| match point.is_exact(place) {
+            Some(false) => Err(false),
+            told => Ok(exact && told.is_some()),
+        });
+        if told == Err(false) {
+            continue;
+        }
+        let factor = divisor.map(|(_, e)| x.recip(e));
         let scaled: Vec<(Symbol, Expr)> = terms
             .iter()
             .map(|&(s, e)| {
-                let product = if factor == ONE { e } else { x.mul(&[factor, e]) };
+                let product = factor.map_or(e, |factor| x.mul(&[factor, e]));
                 (s, x.simplify(product))
             })
             .collect();
-        if is_exact(x, graph, &scaled)
+        let known = points.is_some() && told == Ok(true);
+        if (known || is_exact(x, graph, &scaled))
             && let Some(potential) = x.potential(&scaled)
         {
             return Some(VelocityRelation { terms: scaled, integral: Integral::Closed(potential) });
@@ -442,7 +461,7 @@ fn curl(x: &mut Exprs, of: &BTreeMap<Symbol, Expr>, a: Symbol, b: Symbol) -> Exp
 fn test_together(x: &mut Exprs, graph: &BondGraph, relations: &mut [VelocityRelation]) {
     let forms: Vec<&[(Symbol, Expr)]> = relations.iter().map(|r| r.terms.as_slice()).collect();
     let all: Vec<Symbol> = coordinates(x, graph, forms).into_iter().collect();
-    let undecided = relations.iter().any(|r| r.integral == Integral::Undecided) || all.len() > TESTED;
+    let undecided = relations.iter().any(|r| r.integral == Integral::Undecided) || all.len() > TESTED_BY_VALUES;
     let place: BTreeMap<Symbol, usize> = all.iter().enumerate().map(|(k, &s)| (s, k)).collect();
     let rows = |relation: &VelocityRelation| {
         let mut row: Vec<(usize, Expr)> = relation.terms.iter().map(|&(s, e)| (place[&s], e)).collect();
@@ -464,13 +483,143 @@ fn test_together(x: &mut Exprs, graph: &BondGraph, relations: &mut [VelocityRela
     let mut leaves: Vec<bool> = Vec::new();
     for relation in relations.iter() {
         let of: BTreeMap<Symbol, Expr> = relation.terms.iter().copied().collect();
-        leaves.push(open(relation) && leads_out(x, &all, &of, (&free, &moves)));
+        let leads_out = || match leads_out_by_values(x, &all, &relation.terms, (&free, &moves)) {
+            None if all.len() <= TESTED => Some(leads_out(x, &all, &of, (&free, &moves))),
+            told => told,
+        };
+        match open(relation).then(leads_out) {
+            Some(None) => {
+                relations.iter_mut().filter(|r| open(r)).for_each(|r| r.integral = Integral::Undecided);
+                return;
+            }
+            told => leaves.push(told.flatten().unwrap_or(false)),
+        }
     }
     let any = leaves.iter().any(|l| *l);
     for (relation, leaves) in relations.iter_mut().zip(leaves) {
         if relation.integral == Integral::Open && any {
             relation.integral = if leaves { Integral::Nonholonomic } else { Integral::Undecided };
         }
+    }
+}
+
+/// Whether the curl of a form does not vanish on two motions that keep all relations, by its values at a few points; `None` where
+/// these do not tell.
+fn leads_out_by_values(
+    x: &Exprs,
+    all: &[Symbol],
+    terms: &[(Symbol, Expr)],
+    (free, moves): (&[usize], &[BTreeMap<usize, Expr>]),
+) -> Option<bool> {
+    let (n, m) = (all.len(), free.len());
+    let mut vanishes = true;
+    for number in 0..POINTS {
+        let form = FormAt::new(x, all, terms, number)?;
+        let curl: Vec<(f64, f64)> =
+            (0..n).flat_map(|a| (0..n).map(move |b| (a, b))).map(|(a, b)| form.curl(a, b, None)).collect();
+        let mut at = |s: Symbol| somewhere(number, s);
+        let mut values = Evaluator::new(x, &mut at);
+        let moves: Vec<Vec<(usize, f64)>> = moves
+            .iter()
+            .map(|row| row.iter().filter_map(|(c, &e)| Some((free.binary_search(c).ok()?, values.value(e)))).collect())
+            .collect();
+        let mut along = vec![(0.0, 0.0); n * m];
+        for a in 0..n {
+            for (b, row) in moves.iter().enumerate().filter(|(b, _)| curl[a * n + b].1 > 0.0) {
+                for &(f, value) in row {
+                    along[a * m + f].0 += curl[a * n + b].0 * value;
+                    along[a * m + f].1 += curl[a * n + b].1 * value.abs();
+                }
+            }
+        }
+        for first in 0..m {
+            let mut sums = vec![(0.0, 0.0); first];
+            for (a, row) in moves.iter().enumerate() {
+                let Some(&(_, value)) = row.iter().find(|entry| entry.0 == first) else { continue };
+                for (second, sum) in sums.iter_mut().enumerate() {
+                    sum.0 += value * along[a * m + second].0;
+                    sum.1 += value.abs() * along[a * m + second].1;
+                }
+            }
+            for sum in sums {
+                match is_zero_beside_its_terms(sum) {
+                    Some(false) => return Some(true),
+                    zero => vanishes &= zero.is_some(),
+                }
+            }
+        }
+    }
+    vanishes.then_some(false)
+}
+
+/// Whether a sum vanishes, by its value and the sum of the sizes of its terms; `None` where rounding may be all there is, or not.
+fn is_zero_beside_its_terms((sum, size): (f64, f64)) -> Option<bool> {
+    match sum.abs() / size {
+        _ if size == 0.0 => Some(true),
+        part if part > CLEARLY => Some(false),
+        part => (part <= ROUNDING).then_some(true),
+    }
+}
+
+/// A form at a point: the coefficients of its coordinates, and how steep each is in all of them.
+struct FormAt {
+    values: Vec<f64>,
+    /// By rows of the coefficients.
+    slopes: Vec<f64>,
+}
+
+impl FormAt {
+    /// The form with these terms; `None` where a coefficient has corners.
+    fn new(x: &Exprs, all: &[Symbol], terms: &[(Symbol, Expr)], number: u64) -> Option<FormAt> {
+        let (n, place) = (all.len(), |s: &Symbol| all.binary_search(s).ok());
+        let coefficients: Vec<Expr> = terms.iter().map(|t| t.1).collect();
+        let order = EvaluationOrder::new(x, &coefficients);
+        let columns: Vec<Option<usize>> = order.symbols().iter().map(place).collect();
+        let mut room = Vec::new();
+        let found = order.values_in(&mut room, |k| [somewhere(number, order.symbols()[k])]);
+        let mut form = FormAt { values: vec![0.0; n], slopes: vec![0.0; n * n] };
+        for ((symbol, _), value) in terms.iter().zip(found) {
+            form.values[place(symbol)?] = value[0];
+        }
+        let mut weights = vec![0.0; terms.len()];
+        for (k, (symbol, _)) in terms.iter().enumerate() {
+            weights[k] = 1.0;
+            let row = place(symbol)?;
+            for (column, slope) in columns.iter().zip(order.slopes(&room, &weights)?) {
+                column.iter().for_each(|column| form.slopes[row * n + column] = slope);
+            }
+            weights[k] = 0.0;
+        }
+        Some(form)
+    }
+
+    /// `∂c_b/∂a - ∂c_a/∂b`, with the sum of the sizes of its terms; of the form divided by one of its coefficients, if so.
+    fn curl(&self, a: usize, b: usize, divided_by: Option<usize>) -> (f64, f64) {
+        let n = self.values.len();
+        let slope = |of: usize, by: usize| match divided_by {
+            None => (self.slopes[of * n + by], self.slopes[of * n + by].abs()),
+            Some(k) => {
+                let below = self.values[k];
+                let (own, moved) = (self.slopes[of * n + by], self.values[of] * self.slopes[k * n + by] / below);
+                ((own - moved) / below, (own.abs() + moved.abs()) / below.abs())
+            }
+        };
+        let (first, second) = (slope(b, a), slope(a, b));
+        (first.0 - second.0, first.1 + second.1)
+    }
+
+    /// Whether all curls vanish; `None` where some may.
+    fn is_exact(&self, divided_by: Option<usize>) -> Option<bool> {
+        let mut told = Some(true);
+        for a in 0..self.values.len() {
+            for b in 0..a {
+                match is_zero_beside_its_terms(self.curl(a, b, divided_by)) {
+                    Some(false) => return Some(false),
+                    zero => told = told.and(zero),
+                }
+            }
+        }
+        told
     }
 }
 

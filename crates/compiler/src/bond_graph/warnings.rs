@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::FxHashSet;
+
 use super::{Bond, BondGraph, Element, Kind, Meaning, Storage, StorageLaw};
 use crate::algebra::{Expr, Symbol};
 use crate::diagnostic::{Diagnostic, codes};
@@ -52,7 +54,7 @@ fn displaced_by_inputs(graph: &BondGraph) -> Vec<Diagnostic> {
 fn lonely_junctions(graph: &BondGraph) -> Vec<Diagnostic> {
     let alone = |e: &&Element| matches!(e.kind, Kind::Zero | Kind::One) && e.ports.len() == 1;
     let read: BTreeSet<Symbol> = match graph.elements.values().any(|e| alone(&e)) {
-        true => graph.expressions().into_iter().flat_map(|e| graph.exprs.symbols_of(e)).collect(),
+        true => graph.exprs.symbols_met(&graph.expressions(), &mut FxHashSet::default()).into_iter().collect(),
         false => BTreeSet::new(),
     };
     let named = |e: &Element| {

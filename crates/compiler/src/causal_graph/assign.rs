@@ -10,7 +10,7 @@ use super::start_point::start_point;
 use super::strokes::{Strokes, parts, sits_here};
 use super::verify::verify;
 use super::{CausalGraph, Combination, Kept, Ports, Role, Stroke, break_set, contradiction, digits, local};
-use crate::algebra::{Exprs, NumericPoint, Symbol};
+use crate::algebra::{Exprs, NumericPoint, Residue, Symbol};
 use crate::bond_graph::{BondGraph, BondId, ElementId, Kind, Meaning, PortCausality, PortRef, ResistorLaw};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::ids::{Id, Map, Table};
@@ -670,7 +670,16 @@ struct Span<'a> {
     ports: Ports,
     /// Roles of ports by the variables that they are given.
     roles: BTreeMap<Symbol, Role>,
+    shares: Map<Symbol, Option<Shares>>,
     known: Map<Symbol, Combination>,
+}
+
+/// Sums of what a variable is made of, coefficients times random numbers: one vanishes only if there is nothing of its kind.
+#[derive(Clone, Copy)]
+struct Shares {
+    independent: Residue,
+    /// What neither independent storages nor sources give.
+    others: Residue,
 }
 
 impl<'a> Span<'a> {
@@ -679,6 +688,7 @@ impl<'a> Span<'a> {
             graph,
             ports: Ports { definitions: solved.definitions.iter().cloned().collect(), ..Ports::default() },
             roles: solved.ports.iter().map(|p| (p.input, p.role)).collect(),
+            shares: Map::new(),
             known: Map::new(),
         }
     }
@@ -688,10 +698,40 @@ impl<'a> Span<'a> {
         let junction = &self.graph.elements[speed.junction];
         let bond = &self.graph.bonds[junction.ports[0].bond];
         let common = if matches!(junction.kind, Kind::One) { bond.flow } else { bond.effort };
+        if let Some(shares) = self.shares_of(x, common) {
+            return shares.others.vanishes() && !shares.independent.vanishes();
+        }
         let row = self.ports.resolve(x, common, &mut self.known);
         let roles: Option<Vec<Role>> = row.0.iter().map(|t| self.roles.get(&t.0).copied()).collect();
         let spanning = |role: &Role| matches!(role, Role::Independent | Role::Source | Role::Redundant);
         roles.is_some_and(|roles| roles.iter().all(spanning) && roles.contains(&Role::Independent))
+    }
+
+    /// What a variable is made of; `None` if coefficients have no values in the prime field. Its row, which in a chain is as
+    /// long as the way to the ground, is not written out.
+    fn shares_of(&mut self, x: &Exprs, symbol: Symbol) -> Option<Shares> {
+        let mut open = vec![symbol];
+        while let Some((next, definition)) = self.ports.next_to_resolve(&mut open, |s| self.shares.contains_key(s)) {
+            let mut sum = Some(Shares { independent: Residue::ZERO, others: Residue::ZERO });
+            for &(s, coefficient) in &definition.0 {
+                let own = self.shares.get(&s).copied().unwrap_or_else(|| Some(self.shares_of_input(s)));
+                sum = sum.zip(own).zip(x.residue(coefficient)).map(|((sum, own), factor)| Shares {
+                    independent: sum.independent + factor * own.independent,
+                    others: sum.others + factor * own.others,
+                });
+            }
+            self.shares.insert(next, sum);
+        }
+        self.shares.get(&symbol).copied().unwrap_or_else(|| Some(self.shares_of_input(symbol)))
+    }
+
+    fn shares_of_input(&self, symbol: Symbol) -> Shares {
+        let (own, none) = (Residue::random(u64::from(symbol.0)), Residue::ZERO);
+        match self.roles.get(&symbol) {
+            Some(Role::Independent) => Shares { independent: own, others: none },
+            Some(Role::Source | Role::Redundant) => Shares { independent: none, others: none },
+            _ => Shares { independent: none, others: own },
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::InitialCondition;
 use super::blocks::{components, is_direct};
 use super::definitions::{Definition, Definitions};
-use super::independent_rows::{IndependentRows, Row, equilibrate};
+use super::independent_rows::{Row, equilibrate, independent};
 use super::points::solved;
 use crate::algebra::{Expr, Exprs, NumericPoint, Symbol, ZERO};
 use crate::bond_graph::{Guess, Meaning};
@@ -282,8 +282,7 @@ impl Freedom {
         rows.extend(wanted.iter().map(|&(s, _)| Row::from([(s, 1.0)])));
         own.extend(wanted.iter().map(|_| None));
         equilibrate(&mut rows);
-        let mut known = IndependentRows::default();
-        let added: Vec<bool> = rows.into_iter().zip(own).map(|(row, own)| known.add(row, own)).collect();
+        let added = independent(&rows.into_iter().zip(own).collect::<Vec<_>>());
         let first = added.len() - wanted.len();
         wanted.iter().zip(&added[first..]).filter(|(_, added)| **added).map(|(w, _)| *w).collect()
     }

@@ -30,42 +30,76 @@ pub(super) fn equilibrate(rows: &mut [Row]) {
     }
 }
 
+/// Which rows are independent of those before them. Each is solved for its own symbol, if it can be, where it has one.
+pub(super) fn independent(rows: &[(Row, Option<Symbol>)]) -> Vec<bool> {
+    let mut columns: Vec<Symbol> = rows.iter().flat_map(|(row, _)| row.keys().copied()).collect();
+    columns.sort_unstable();
+    columns.dedup();
+    let place = |s: &Symbol| columns.binary_search(s).ok();
+    let mut known = IndependentRows::new(columns.len());
+    let mut add = |(row, own): &(Row, Option<Symbol>)| {
+        let row = row.iter().map(|(s, &v)| (place(s).expect("all symbols have a column"), v));
+        known.add(row, own.as_ref().and_then(place))
+    };
+    rows.iter().map(&mut add).collect()
+}
+
 /// Rows that are independent of each other, each solved for its pivot and free of the pivots of those before it.
-#[derive(Default)]
-pub(super) struct IndependentRows {
-    rows: Vec<(Symbol, Row)>,
-    place: BTreeMap<Symbol, usize>,
+struct IndependentRows {
+    rows: Vec<(usize, Vec<(usize, f64)>)>,
+    /// The row of each pivot.
+    place: Vec<Option<usize>>,
+    /// The row that is being reduced, with what each entry is the sum of, in magnitude; entries by column, where there are any.
+    values: Vec<Option<(f64, f64)>>,
 }
 
 impl IndependentRows {
-    /// Adds a row if it is independent of those that are there. `own` is the symbol it is to be solved for, if it can be.
-    pub fn add(&mut self, mut row: Row, own: Option<Symbol>) -> bool {
-        // What each entry is the sum of, in magnitude.
-        let mut sizes: Row = row.iter().map(|(&s, v)| (s, v.abs())).collect();
-        let mut open: BTreeSet<usize> = row.keys().filter_map(|s| self.place.get(s)).copied().collect();
+    fn new(columns: usize) -> IndependentRows {
+        IndependentRows { rows: Vec::new(), place: vec![None; columns], values: vec![None; columns] }
+    }
+
+    /// Adds a row if it is independent of those that are there. `own` is the column it is to be solved for, if it can be.
+    fn add(&mut self, row: impl Iterator<Item = (usize, f64)>, own: Option<usize>) -> bool {
+        let (mut met, mut open) = (Vec::new(), BTreeSet::new());
+        for (column, value) in row {
+            self.values[column] = Some((value, value.abs()));
+            met.push(column);
+            open.extend(self.place[column]);
+        }
         while let Some(k) = open.pop_first() {
             let (pivot, known) = &self.rows[k];
-            let factor = row.remove(pivot).unwrap_or(0.0);
-            if factor.abs() <= ROUNDING * sizes[pivot] {
+            let Some((factor, size)) = self.values[*pivot].take() else { continue };
+            if factor.abs() <= ROUNDING * size {
                 continue;
             }
-            for (&s, v) in known {
-                *row.entry(s).or_default() -= factor * v;
-                *sizes.entry(s).or_default() += (factor * v).abs();
-                open.extend(self.place.get(&s));
+            for &(column, v) in known {
+                match &mut self.values[column] {
+                    Some((value, size)) => {
+                        *value -= factor * v;
+                        *size += (factor * v).abs();
+                    }
+                    none => {
+                        *none = Some((-(factor * v), (factor * v).abs()));
+                        met.push(column);
+                        open.extend(self.place[column]);
+                    }
+                }
             }
         }
-        row.retain(|s, v| v.abs() > ROUNDING * sizes[s]);
-        let greatest = row.iter().fold(None, |most: Option<(Symbol, f64)>, (&s, &v)| match most {
+        met.sort_unstable();
+        let left = met.into_iter().filter_map(|column| Some((column, self.values[column].take()?)));
+        let told = left.filter(|(_, (value, size))| value.abs() > ROUNDING * size);
+        let mut row: Vec<(usize, f64)> = told.map(|(column, (value, _))| (column, value)).collect();
+        let greatest = row.iter().fold(None, |most: Option<(usize, f64)>, &(c, v)| match most {
             Some((_, m)) if m.abs() >= v.abs() => most,
-            _ => Some((s, v)),
+            _ => Some((c, v)),
         });
         let Some(greatest) = greatest else { return false };
-        let own = own.and_then(|s| Some((s, *row.get(&s)?))).filter(|(_, v)| OWN * v.abs() >= greatest.1.abs());
-        let (pivot, value) = own.unwrap_or(greatest);
-        row.remove(&pivot);
-        row.values_mut().for_each(|v| *v /= value);
-        self.place.insert(pivot, self.rows.len());
+        let own = own.and_then(|own| row.iter().find(|entry| entry.0 == own).copied());
+        let (pivot, value) = own.filter(|(_, v)| OWN * v.abs() >= greatest.1.abs()).unwrap_or(greatest);
+        row.retain(|entry| entry.0 != pivot);
+        row.iter_mut().for_each(|entry| entry.1 /= value);
+        self.place[pivot] = Some(self.rows.len());
         self.rows.push((pivot, row));
         true
     }
@@ -81,8 +115,7 @@ mod tests {
         let symbols: Vec<Symbol> = (0..4).map(|i| x.symbol(&format!("s{i}"), Facts::default())).collect();
         let mut rows: Vec<Row> = rows.iter().map(|row| row.iter().map(|&(i, v)| (symbols[i], v)).collect()).collect();
         equilibrate(&mut rows);
-        let mut known = IndependentRows::default();
-        rows.into_iter().map(|row| known.add(row, None)).collect()
+        independent(&rows.into_iter().map(|row| (row, None)).collect::<Vec<_>>())
     }
 
     #[test]

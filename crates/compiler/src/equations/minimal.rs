@@ -411,7 +411,7 @@ impl<'a> Assembled<'a> {
         if followers.iter().any(|f| !self.d.is_constant(f.factor)) {
             return None;
         }
-        let mut row = self.rows.of(&mut self.d.x, balance.rate)?.clone();
+        let mut row = self.rows.own(&mut self.d.x, balance.rate)?;
         row.0.retain(|t| followers.iter().all(|f| f.rate != t.0));
         let mut terms = vec![balance.own];
         for f in followers.iter().filter(|_| !balance.is_momentum) {

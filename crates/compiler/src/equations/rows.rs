@@ -127,6 +127,14 @@ impl<'a> Rows<'a> {
         Some(Combination(factors.into_iter().filter_map(sum).collect()))
     }
 
+    /// The row of a variable, where it is not known from others that of it [`alone`](Rows::alone).
+    pub fn own(&self, x: &mut Exprs, symbol: Symbol) -> Option<Combination> {
+        match self.known.get(&symbol) {
+            Some(known) => Some(known.clone()),
+            None => self.alone(x, symbol),
+        }
+    }
+
     /// A variable over what elements give, and over variables whose own rows have long coefficients.
     fn shortly(&mut self, x: &mut Exprs, symbol: Symbol) -> Option<Combination> {
         let ports = self.ports?;

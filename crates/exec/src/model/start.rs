@@ -5,7 +5,7 @@ use super::equilibrium::exchanged;
 use super::minimum_norm;
 use super::{Model, StartConflict, StartError, StartValue};
 use crate::bytecode::{Layout, Routine};
-use halfarrow_compiler::program::{Op, Program, StartGroup, Value};
+use halfarrow_compiler::program::{Op, Program, StartGroup, StartGuess, Value};
 use halfarrow_sim::{Affected, Failure};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -137,19 +137,29 @@ impl Model {
     fn begin_search(&mut self, t: f64, n: usize) -> Unknowns {
         let mut z = vec![0.0; n];
         let mut guessed = vec![false; n];
-        for guess in self.code.program.guesses.clone() {
-            let unknown = guess.unknown as usize;
-            let routine = self.start_routine(&[guess.residual]);
-            guessed[unknown] = true;
-            if self.residuals(t, &routine, &z, Some(&[unknown])).is_err() {
-                continue;
+        let guesses = self.code.program.guesses.clone();
+        guesses.iter().for_each(|guess| guessed[guess.unknown as usize] = true);
+        for together in beside_each_other(&guesses) {
+            if self.place_guesses(t, together, &mut z).is_none() && together.len() > 1 {
+                together.chunks(1).for_each(|guess| _ = self.place_guesses(t, guess, &mut z));
             }
-            let out = routine.outputs[0] as usize;
-            let place = z[unknown] - self.frame.r[out] / self.frame.d[out];
-            z[unknown] = if place.is_finite() { place } else { z[unknown] };
         }
         let met = vec![false; self.code.program.start.len()];
         Unknowns { z, guessed, known: vec![false; n], met }
+    }
+
+    /// Moves unknowns to where they are guessed, none of which another of these guesses reads. `None` where one of them has no
+    /// value.
+    fn place_guesses(&mut self, t: f64, together: &[StartGuess], z: &mut [f64]) -> Option<()> {
+        let residuals: Vec<Value> = together.iter().map(|guess| guess.residual).collect();
+        let unknowns: Vec<usize> = together.iter().map(|guess| guess.unknown as usize).collect();
+        let routine = self.start_routine(&residuals);
+        self.residuals(t, &routine, z, Some(&unknowns)).ok()?;
+        for (unknown, &out) in unknowns.into_iter().zip(&routine.outputs) {
+            let place = z[unknown] - self.frame.r[out as usize] / self.frame.d[out as usize];
+            z[unknown] = if place.is_finite() { place } else { z[unknown] };
+        }
+        Some(())
     }
 
     /// Checks that every start value is finite.
@@ -722,6 +732,24 @@ impl Model {
         self.frame.reserve(&routine);
         routine
     }
+}
+
+/// Guesses in a row of which none reads what another one of them places: one routine computes them all.
+fn beside_each_other(guesses: &[StartGuess]) -> Vec<&[StartGuess]> {
+    let mut parts = Vec::new();
+    let (mut start, mut placed, mut read) = (0, BTreeSet::new(), BTreeSet::new());
+    for (k, guess) in guesses.iter().enumerate() {
+        let others = || guess.reads.iter().filter(|&&u| u != guess.unknown);
+        if placed.contains(&guess.unknown) || read.contains(&guess.unknown) || others().any(|u| placed.contains(u)) {
+            parts.push(&guesses[start..k]);
+            (start, placed, read) = (k, BTreeSet::new(), BTreeSet::new());
+        }
+        placed.insert(guess.unknown);
+        read.extend(others().copied());
+    }
+    parts.push(&guesses[start..]);
+    parts.retain(|part| !part.is_empty());
+    parts
 }
 
 /// The greatest rate, in 1/s, at which a state moves by itself or two move each other.
