@@ -43,6 +43,17 @@ for i in 1..SIZE {
     }
 }
 "#;
+/// A second body on each of the first ones, tied to the next of these by a rod: a chain of closed loops in space.
+const RODS: &str = r#"
+for i in 2..SIZE {
+    link[i - 1] -> Revolute:knee[i](n = if mod(i, 2) == 1 then [0, 1, 0] else [1, 0, 0], q0 = 1) -> 1[frame]:side[i]
+    side[i] -> Body:weight[i](m = 0.2, J = diag([0.01, 0.012, 0.008]), c = [0, 0, 0.1])
+    side[i] -> FixedTranslation:eye[i](d = [0.1, 0.1, 0.2]) -> 1[frame]:pin[i]
+    Rod:rod[i](l = 0.7)
+    link[i] -> rod[i].a
+    pin[i] -> rod[i].b
+}
+"#;
 /// Springs with dampers from the last of them back to the ground, one to a point on the axis of the first hinge, whose motion
 /// cancels in it.
 const BACK_TO_THE_ROOT: &str = r#"
@@ -71,6 +82,8 @@ for i in 1..n {
 const ROPES_GROW: f64 = 1.01;
 /// How the operations of the largest two chains of hinges may grow.
 const HINGES_GROW: f64 = 1.08;
+/// And of those with loops.
+const RODS_GROW: f64 = 1.1;
 
 fn operations(text: &str) -> usize {
     let model = Model::from_text("growing.bond", text, &[]).expect("a model");
@@ -95,9 +108,11 @@ fn work_grows_with_the_cells() {
         assert!(exponent <= most, "{} grows as the power {exponent:.3} of its cells", family.name());
     }
     let whip = format!("{HINGES}{BACK_TO_THE_ROOT}");
+    let loops = format!("{HINGES}{RODS}");
     for (name, text, sizes, most) in [
         ("hinges", HINGES, [10, 40, 80], HINGES_GROW),
         ("whip", &whip, [10, 40, 80], HINGES_GROW),
+        ("loops", &loops, [10, 40, 80], RODS_GROW),
         ("ropes", ROPES, [10, 100, 1000], ROPES_GROW),
     ] {
         let counted = sizes.map(|size| operations(&text.replace("SIZE", &size.to_string())));

@@ -9,6 +9,9 @@ use crate::ids::Id;
 use rustc_hash::FxHashMap;
 use std::collections::BTreeMap;
 
+/// So many symbols are taken out of expressions one by one.
+const FEW: usize = 8;
+
 /// What a derivative is taken by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum By {
@@ -129,8 +132,24 @@ impl Exprs {
     pub fn without_idle(&mut self, roots: &[Expr], may_go: &dyn Fn(Symbol) -> bool) -> Vec<Expr> {
         let mut hardly_moved = EvaluationOrder::new(self, roots).hardly_moved(may_go);
         hardly_moved.sort_unstable_by_key(|moved| moved.0);
+        let mut maybe: Vec<Vec<Symbol>> = vec![Vec::new(); roots.len()];
+        hardly_moved.iter().for_each(|(symbol, members)| members.iter().for_each(|&i| maybe[i].push(*symbol)));
+        let mut found = roots.to_vec();
+        // Many of them mostly may go all at once: what carries a loop of a chain are all joints before it.
+        let mut done = vec![false; roots.len()];
+        for (symbols, members) in by_symbols(maybe).into_iter().filter(|(symbols, _)| symbols.len() > FEW) {
+            let own: Vec<Expr> = members.iter().map(|&i| roots[i]).collect();
+            let at = self.substitute_all(&own, &symbols.into_iter().map(|s| (s, ZERO)).collect());
+            for (i, value) in members.into_iter().zip(at) {
+                if self.has_value_of(value, roots[i]) {
+                    // Where joints are not turned, lengths before them are numbers in several sums.
+                    (found[i], done[i]) = (self.with_numbers_joined(value), true);
+                }
+            }
+        }
         let mut idle: Vec<Vec<Symbol>> = vec![Vec::new(); roots.len()];
         for (symbol, members) in hardly_moved {
+            let members: Vec<usize> = members.into_iter().filter(|&i| !done[i]).collect();
             let own: Vec<Expr> = members.iter().map(|&i| roots[i]).collect();
             let at = self.substitute_all(&own, &BTreeMap::from([(symbol, ZERO)]));
             for (i, (root, value)) in members.into_iter().zip(own.into_iter().zip(at)) {
@@ -139,10 +158,7 @@ impl Exprs {
                 }
             }
         }
-        let mut alike: BTreeMap<Vec<Symbol>, Vec<usize>> = BTreeMap::new();
-        idle.into_iter().enumerate().for_each(|(i, symbols)| alike.entry(symbols).or_default().push(i));
-        let mut found = roots.to_vec();
-        for (symbols, members) in alike {
+        for (symbols, members) in by_symbols(idle) {
             let mut own: Vec<Expr> = members.iter().map(|&i| roots[i]).collect();
             for symbol in symbols {
                 // A quaternion of zeros turns nothing.
@@ -157,6 +173,41 @@ impl Exprs {
             members.into_iter().zip(own).for_each(|(i, e)| found[i] = e);
         }
         found
+    }
+
+    /// The expression with one number in the place of several that stand in a sum and in sums within it.
+    fn with_numbers_joined(&mut self, e: Expr) -> Expr {
+        let mut new: FxHashMap<Expr, Expr> = FxHashMap::default();
+        for part in self.below(&[e], &|_| true) {
+            let known = |c: Expr| new.get(&c).copied().unwrap_or(c);
+            let mut made = self.rebuild(part, &known);
+            if let Node::Add(terms) = self.node(made) {
+                let terms = terms.clone();
+                let sums: Vec<Option<(Expr, Vec<Expr>)>> = terms.iter().map(|&e| self.sum_with_number(e)).collect();
+                let alone = terms.iter().filter(|&&e| self.is_number(e).is_some()).count();
+                if alone + sums.iter().flatten().count() > 1 {
+                    let mut all = Vec::new();
+                    for (&term, sum) in terms.iter().zip(sums) {
+                        match sum {
+                            Some((factor, within)) => all.extend(within.into_iter().map(|e| self.mul(&[factor, e]))),
+                            None => all.push(term),
+                        }
+                    }
+                    made = self.add(&all);
+                }
+            }
+            new.insert(part, made);
+        }
+        new[&e]
+    }
+
+    /// The terms of a sum with a number among them, be it taken as a whole, and the number that it is multiplied by.
+    fn sum_with_number(&mut self, e: Expr) -> Option<(Expr, Vec<Expr>)> {
+        let (factor, sum) = self.coefficient(e);
+        let sum = if let Node::Whole(part) = self.node(sum) { *part } else { sum };
+        let Node::Add(terms) = self.node(sum) else { return None };
+        let terms = terms.to_vec();
+        terms.iter().any(|&e| self.is_number(e).is_some()).then(|| (self.number(factor), terms))
     }
 
     /// Whether the values in the prime field are the same, where there are any.
@@ -384,4 +435,12 @@ impl Exprs {
         self.slope_tables.insert(table, id);
         id
     }
+}
+
+/// The numbers of those that have the same symbols, if they have any.
+fn by_symbols(all: Vec<Vec<Symbol>>) -> BTreeMap<Vec<Symbol>, Vec<usize>> {
+    let mut alike: BTreeMap<Vec<Symbol>, Vec<usize>> = BTreeMap::new();
+    let some = all.into_iter().enumerate().filter(|(_, symbols)| !symbols.is_empty());
+    some.for_each(|(i, symbols)| alike.entry(symbols).or_default().push(i));
+    alike
 }

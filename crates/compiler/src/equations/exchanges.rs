@@ -9,7 +9,8 @@ use super::minimal::{Assembled, rows_of};
 use crate::algebra::{Expr, Exprs, Node, NumericPoint, Residue, Symbol};
 use crate::bond_graph::{Kind, Meaning};
 use crate::causal_graph::start_point::start_point;
-use crate::causal_graph::{CausalGraph, PortState, Role, magnitude_of_slope};
+use crate::causal_graph::{CausalGraph, PortState, Ports, Role, magnitude_of_slope};
+use crate::ids::Map;
 
 /// Larger tables of ratios are not looked at.
 const MOST: usize = 20_000;
@@ -93,9 +94,14 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
             weight: weights.get(&symbol).copied(),
         }
     };
+    let mut divided: Map<Symbol, bool> = Map::new();
     for symbol in dependent {
         if found.dependent.len() * independent.len() > MOST {
             return Exchanges::default();
+        }
+        // Where no speed has a storage the rows of what is not divided by anything need not be written out.
+        if stored.is_empty() && !is_divided(&d.x, ports, symbol, &divisors, &mut divided) {
+            continue;
         }
         let Some(row) = rows.of(&mut d.x, symbol).cloned() else { continue };
         // Beside a speed without inertia, which has none to be compared by, only what is divided by what may vanish counts:
@@ -118,6 +124,23 @@ pub(super) fn exchanges(assembled: &mut Assembled, causal: &CausalGraph, conserv
     }
     found.independent.extend(read.into_iter().map(|symbol| of(d, &weights, symbol)));
     found
+}
+
+/// Whether a variable is made of anything that is divided by one of these; with what is known of others.
+fn is_divided(
+    x: &Exprs,
+    ports: &Ports,
+    symbol: Symbol,
+    divisors: &BTreeSet<Residue>,
+    known: &mut Map<Symbol, bool>,
+) -> bool {
+    let mut open = vec![symbol];
+    while let Some((next, definition)) = ports.next_to_resolve(&mut open, |s| known.contains_key(s)) {
+        let read = |t: &(Symbol, Expr)| known.get(&t.0) == Some(&true) || divides(x, t.1, divisors);
+        let divided = definition.0.iter().any(read);
+        known.insert(next, divided);
+    }
+    known.get(&symbol) == Some(&true)
 }
 
 /// What divisors, their factors and their products are, but for numbers: a pivot is itself divided by those before it, which

@@ -9,7 +9,8 @@
 //! Each pivot is one of the matrix of all rates, eliminated in some order. Of a symmetric definite matrix none vanishes,
 //! whatever the order; only where the matrix is found to be one is a rate eliminated.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -28,6 +29,8 @@ const MOST_LEFT: usize = 1000;
 /// A part of a machine is cut off by few variables where these are no more: six motions of a body in space, and some of the
 /// joints beside.
 const SHORT: usize = 9;
+/// So many variables are looked at in the search for a short cut.
+const WIDEST: usize = 5000;
 /// Variables of bonds that are others by name alone are followed so far.
 const ALIASES: usize = 100;
 /// Columns of the matrix of a loop that are found at once.
@@ -70,6 +73,9 @@ pub struct Eliminated {
 
 /// The points at which a matrix is looked at: it is symmetric anywhere, and definite at the given parameters.
 const PLACES: [(usize, Parameters); 3] = [(0, Parameters::Any), (1, Parameters::Given), (2, Parameters::Given)];
+
+/// The coefficients of forms at a point, by the variables that they multiply.
+type Coefficients = Vec<Vec<(usize, f64)>>;
 
 /// A linear form in variables of the loop, by their numbers.
 #[derive(Debug, Clone)]
@@ -246,7 +252,7 @@ impl Open<'_> {
     }
 
     /// The coefficients of all forms at a point.
-    fn coefficients(&self, point: &mut Point) -> Vec<Vec<(usize, f64)>> {
+    fn coefficients(&self, point: &mut Point) -> Coefficients {
         let value = |(&j, &e): (&usize, &Expr), point: &mut Point| (j, point.value(self.x, e));
         self.forms.iter().map(|form| form.terms.iter().map(|term| value(term, point)).collect()).collect()
     }
@@ -305,11 +311,16 @@ impl Open<'_> {
         let mut unknowns: Vec<(u32, usize)> = self.between_all().into_iter().zip(0..).collect();
         unknowns.sort_unstable();
         for (_, k) in unknowns {
-            let between = self.between(k);
+            let mut between = self.between(k);
             let boundary = self.boundary(k, &between);
             let is_cut = match cut {
-                Cut::Short => boundary <= SHORT,
-                Cut::ShorterThanRates => boundary < self.further_in(k, boundary),
+                Cut::Short if boundary.len() > SHORT && self.unknowns > FEW => {
+                    let behind = shortest_cut(&boundary, SHORT, |j| self.read_inward(j));
+                    between.extend(behind.iter().flatten().filter(|&&j| j >= self.unknowns));
+                    behind.is_some()
+                }
+                Cut::Short => true,
+                Cut::ShorterThanRates => boundary.len() < self.further_in(k, boundary.len()),
             };
             if !is_cut || !self.is_read(k) {
                 continue;
@@ -378,11 +389,16 @@ impl Open<'_> {
         }
     }
 
-    /// How many other variables the residual of an unknown reads through these.
-    fn boundary(&self, k: usize, between: &BTreeSet<usize>) -> usize {
+    /// The other variables that the residual of an unknown reads through these.
+    fn boundary(&self, k: usize, between: &BTreeSet<usize>) -> BTreeSet<usize> {
         let forms = between.iter().chain([&k]);
         let read: BTreeSet<usize> = forms.flat_map(|&j| self.forms[j].terms.keys().copied()).collect();
-        read.iter().filter(|j| **j != k && !between.contains(j)).count()
+        read.into_iter().filter(|j| *j != k && !between.contains(j)).collect()
+    }
+
+    /// What a variable reads; none of unknowns.
+    fn read_inward(&self, k: usize) -> Option<Vec<usize>> {
+        (k >= self.unknowns).then(|| self.forms[k].terms.keys().copied().collect())
     }
 
     /// How many other unknowns the residual of an unknown reads in the end; more than `enough` are not counted.
@@ -558,7 +574,7 @@ impl Open<'_> {
 /// The matrix of many unknowns at a few points, as the forms that make it up: it has as many entries as there are pairs of
 /// unknowns, its products with vectors take no more than the forms.
 struct Products {
-    points: Vec<(Point, Vec<Vec<(usize, f64)>>)>,
+    points: Vec<(Point, Coefficients)>,
 }
 
 impl Products {
@@ -650,6 +666,97 @@ fn entry(number: u64, k: usize) -> f64 {
     f64::from_bits(1.0f64.to_bits() | (mix(number + 0x5e3d, k as u64) >> 12))
 }
 
+/// Whether so many variables at most stand between some variables and the unknowns, and which of these and of what they read
+/// stands before them: what turns with a body has other numbers in the axes of each of its joints, though there are but six.
+/// `read` tells what a variable reads, none of an unknown. Source: K. Menger's theorem, by paths that share no variable.
+fn shortest_cut(
+    from: &BTreeSet<usize>,
+    most: usize,
+    read: impl Fn(usize) -> Option<Vec<usize>>,
+) -> Option<BTreeSet<usize>> {
+    // Where paths lead on from a variable, and where they come from; none at their ends.
+    let mut next: FxHashMap<usize, Option<usize>> = FxHashMap::default();
+    let mut before: FxHashMap<usize, Option<usize>> = FxHashMap::default();
+    for paths in 0.. {
+        // One more path, which may push others aside: it comes to a variable, and leaves it.
+        let mut reached: FxHashMap<(usize, Step), Option<(usize, Step)>> = FxHashMap::default();
+        let mut open: VecDeque<(usize, Step)> = VecDeque::new();
+        for &start in from {
+            reached.insert((start, Step::To), None);
+            open.push_back((start, Step::To));
+        }
+        let mut end = None;
+        while let Some(at) = open.pop_front() {
+            if reached.len() > WIDEST {
+                return None;
+            }
+            let mut go = |to: (usize, Step)| {
+                if let Entry::Vacant(new) = reached.entry(to) {
+                    new.insert(Some(at));
+                    open.push_back(to);
+                }
+            };
+            match at {
+                (k, Step::To) => match before.get(&k) {
+                    None => go((k, Step::From)),
+                    Some(pushed) => pushed.iter().for_each(|&before| go((before, Step::From))),
+                },
+                (k, Step::From) => {
+                    let taken = next.get(&k);
+                    match read(k) {
+                        None if taken.is_none() => {
+                            end = Some(at);
+                            break;
+                        }
+                        None => {}
+                        Some(read) => {
+                            read.into_iter().filter(|j| taken != Some(&Some(*j))).for_each(|j| go((j, Step::To)))
+                        }
+                    }
+                    if taken.is_some() {
+                        go((k, Step::To));
+                    }
+                }
+            }
+        }
+        let Some(end) = end else {
+            let behind = reached.into_keys().filter(|at| at.1 == Step::From).map(|at| at.0);
+            return Some(behind.collect());
+        };
+        if paths == most {
+            return None;
+        }
+        let mut way = vec![end];
+        while let Some(at) = reached[&way[way.len() - 1]] {
+            way.push(at);
+        }
+        way.reverse();
+        before.insert(way[0].0, None);
+        for step in way.windows(2) {
+            match (step[0], step[1]) {
+                ((k, Step::From), (j, Step::To)) if k == j => {
+                    next.remove(&k);
+                    before.remove(&k);
+                }
+                ((k, Step::From), (j, Step::To)) => {
+                    next.insert(k, Some(j));
+                    before.insert(j, Some(k));
+                }
+                _ => {}
+            }
+        }
+        next.insert(end.0, None);
+    }
+    None
+}
+
+/// Whether a path comes to a variable or leaves it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Step {
+    To,
+    From,
+}
+
 /// What is reached from somewhere, step by step.
 struct Reached {
     seen: FxHashSet<usize>,
@@ -737,4 +844,44 @@ fn has_positive_pivots(n: usize, mut matrix: Vec<f64>) -> bool {
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four numbers of two motions: two variables stand before the unknowns, in whatever way they are read.
+    #[test]
+    fn short_cuts_stand_behind_what_turns_with_a_body() {
+        let reads: [&[usize]; 10] = [&[], &[], &[0], &[1, 0], &[2, 3], &[2, 3], &[2], &[3, 2], &[4, 7], &[5]];
+        let read = |k: usize| (k > 1).then(|| reads[k].to_vec());
+        let from = |all: &[usize]| all.iter().copied().collect::<BTreeSet<usize>>();
+        let turning = from(&[4, 5, 6, 7]);
+        assert_eq!(shortest_cut(&turning, 1, read), None);
+        assert_eq!(shortest_cut(&turning, 2, read), Some(turning));
+        // A way that is taken first gives way to another one.
+        assert_eq!(shortest_cut(&from(&[7, 6]), 2, read), Some(BTreeSet::new()));
+        assert_eq!(shortest_cut(&from(&[6, 8]), 2, read), Some(BTreeSet::new()));
+        assert_eq!(shortest_cut(&from(&[6, 9]), 1, read), None);
+        assert_eq!(shortest_cut(&from(&[6]), 1, read), Some(BTreeSet::new()));
+    }
+
+    /// Of `v = a + 2 b`, `w = 3 v` the residuals `5 a + w`, `9 b + 2 w`: `[[8, 6], [6, 21]]`, but for the signs of rows.
+    #[test]
+    fn products_tell_whether_a_matrix_is_symmetric() {
+        let forms = |first: f64, second: f64| {
+            vec![
+                vec![(0, 5.0 * first), (3, first)],
+                vec![(1, 9.0), (3, second)],
+                vec![(0, 1.0), (1, 2.0)],
+                vec![(2, 3.0)],
+            ]
+        };
+        for number in 0..3 {
+            assert!(is_symmetric_by_products(&forms(1.0, 2.0), &[1.0, 1.0], number));
+            assert!(is_symmetric_by_products(&forms(-1.0, 2.0), &[-1.0, 1.0], number));
+            assert!(!is_symmetric_by_products(&forms(-1.0, 2.0), &[1.0, 1.0], number));
+            assert!(!is_symmetric_by_products(&forms(1.0, 2.000_001), &[1.0, 1.0], number));
+        }
+    }
 }
