@@ -183,17 +183,15 @@ impl Exprs {
             let mut made = self.rebuild(part, &known);
             if let Node::Add(terms) = self.node(made) {
                 let terms = terms.clone();
-                let sums: Vec<Option<(Expr, Vec<Expr>)>> = terms.iter().map(|&e| self.sum_with_number(e)).collect();
+                let sums: Vec<Option<[Expr; 2]>> = terms.iter().map(|&e| self.sum_with_number(e)).collect();
                 let alone = terms.iter().filter(|&&e| self.is_number(e).is_some()).count();
                 if alone + sums.iter().flatten().count() > 1 {
-                    let mut all = Vec::new();
-                    for (&term, sum) in terms.iter().zip(sums) {
-                        match sum {
-                            Some((factor, within)) => all.extend(within.into_iter().map(|e| self.mul(&[factor, e]))),
-                            None => all.push(term),
-                        }
-                    }
-                    made = self.add(&all);
+                    let parts = terms.iter().zip(&sums).flat_map(|(term, sum)| match sum {
+                        Some(parts) => &parts[..],
+                        None => std::slice::from_ref(term),
+                    });
+                    let parts: Vec<Expr> = parts.copied().collect();
+                    made = self.add(&parts);
                 }
             }
             new.insert(part, made);
@@ -201,13 +199,18 @@ impl Exprs {
         new[&e]
     }
 
-    /// The terms of a sum with a number among them, be it taken as a whole, and the number that it is multiplied by.
-    fn sum_with_number(&mut self, e: Expr) -> Option<(Expr, Vec<Expr>)> {
+    /// The number in a sum, be it taken as a whole, and what is left of the sum, each times what that is multiplied by.
+    fn sum_with_number(&mut self, e: Expr) -> Option<[Expr; 2]> {
         let (factor, sum) = self.coefficient(e);
-        let sum = if let Node::Whole(part) = self.node(sum) { *part } else { sum };
-        let Node::Add(terms) = self.node(sum) else { return None };
+        let (inner, whole) = if let Node::Whole(part) = self.node(sum) { (*part, true) } else { (sum, false) };
+        let Node::Add(terms) = self.node(inner) else { return None };
         let terms = terms.to_vec();
-        terms.iter().any(|&e| self.is_number(e).is_some()).then(|| (self.number(factor), terms))
+        let (numbers, rest): (Vec<Expr>, Vec<Expr>) = terms.into_iter().partition(|&e| self.is_number(e).is_some());
+        let &[number] = &numbers[..] else { return None };
+        let rest = self.add(&rest);
+        let rest = if whole { self.whole(rest) } else { rest };
+        let factor = self.number(factor);
+        Some([number, rest].map(|part| self.mul(&[factor, part])))
     }
 
     /// Whether the values in the prime field are the same, where there are any.

@@ -83,8 +83,10 @@ pub struct EvaluationOrder<'a> {
 
 /// As many symbols are moved together.
 const LANES: usize = 8;
-/// Values that differ by more than this part of them are different.
+/// Values that differ by more than this part of them are different,
 const CLEARLY: f64 = 1e-6;
+/// and differences below this part of what the values are sums of are rounding.
+const ROUNDING: f64 = 1e-10;
 
 /// A value between 1 and 2, as good as random: that of a symbol at the point of this number.
 pub fn somewhere(number: u64, symbol: Symbol) -> f64 {
@@ -163,6 +165,7 @@ impl<'a> EvaluationOrder<'a> {
         let anywhere: Vec<f64> = self.symbols.iter().map(|&symbol| somewhere(0, symbol)).collect();
         self.values_in(&mut room, |k| [anywhere[k]]);
         let here: Vec<f64> = self.wanted.iter().map(|&at| room[at][0]).collect();
+        let sizes = self.sizes(&room);
         let symbols: Vec<usize> = (0..self.symbols.len()).filter(|&k| may_go(self.symbols[k])).collect();
         let mut found = Vec::with_capacity(symbols.len());
         let mut lanes = Vec::new();
@@ -188,13 +191,36 @@ impl<'a> EvaluationOrder<'a> {
             for (lane, &k) in together.iter().enumerate() {
                 let is_near = |e: usize| {
                     let (one, other) = (here[e], there[e][lane]);
-                    let apart = (one - other).abs() > CLEARLY * (one.abs() + other.abs());
+                    let most = (one.abs() + other.abs()).max(ROUNDING / CLEARLY * sizes[self.wanted[e]]);
+                    let apart = (one - other).abs() > CLEARLY * most;
                     reads[self.wanted[e]] >> lane & 1 == 1 && !apart
                 };
                 found.push((self.symbols[k], (0..self.wanted.len()).filter(|&e| is_near(e)).collect()));
             }
         }
         found
+    }
+
+    /// What values are sums of, in magnitude: what is small beside that is rounding.
+    fn sizes(&self, room: &[[f64; 1]]) -> Vec<f64> {
+        let mut sizes: Vec<f64> = Vec::with_capacity(self.order.len());
+        for (at, evaluated) in self.order.iter().enumerate() {
+            let own = room[at][0].abs();
+            let size = match *evaluated {
+                Evaluated::Number(_) | Evaluated::Symbol(_) => own,
+                Evaluated::Node(node, first) => {
+                    let part = |k: usize| sizes[self.parts[first + k] as usize];
+                    match node {
+                        Node::Add(terms) => (0..terms.len()).map(part).sum(),
+                        Node::Mul(factors) => (0..factors.len()).map(part).product(),
+                        Node::Whole(_) => part(0),
+                        _ => own,
+                    }
+                }
+            };
+            sizes.push(size);
+        }
+        sizes
     }
 
     /// The slopes of the sum of all expressions, each times a weight, by each of the symbols, at the point whose values
