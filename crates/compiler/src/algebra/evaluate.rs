@@ -1,7 +1,7 @@
 //! Values in floating point.
 
 use super::exprs::Exprs;
-use super::fingerprint::mix;
+use super::fingerprint::scattered;
 use super::math;
 use super::node::{Expr, Function, Node, Symbol};
 use rustc_hash::FxHashMap;
@@ -90,7 +90,7 @@ const ROUNDING: f64 = 1e-10;
 
 /// A value between 1 and 2, as good as random: that of a symbol at the point of this number.
 pub fn somewhere(number: u64, symbol: Symbol) -> f64 {
-    f64::from_bits(1.0f64.to_bits() | (mix(number + 0x51de, u64::from(symbol.0)) >> 12))
+    scattered(number + 0x51de, u64::from(symbol.0))
 }
 
 /// How a value comes about.

@@ -33,6 +33,11 @@ pub fn mix(a: u64, b: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A number between 1 and 2, as good as random and the same for the same two values.
+pub fn scattered(a: u64, b: u64) -> f64 {
+    f64::from_bits(1.0f64.to_bits() | (mix(a, b) >> 12))
+}
+
 /// A random element other than 0, the same for the same key.
 pub fn random(lane: usize, key: u64) -> u64 {
     1 + mix(lane as u64 + 0x1a9e, key) % (P - 1)

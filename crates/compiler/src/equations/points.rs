@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::algebra::{Evaluator, Expr, Exprs, Symbol, mix};
+use crate::algebra::{Evaluator, Expr, Exprs, Symbol, scattered};
 use crate::ids::Id;
 
 /// How many points are tried.
@@ -36,7 +36,7 @@ pub fn somewhere(point: usize, symbol: Symbol) -> f64 {
 }
 
 fn mixed(point: usize, number: u64) -> f64 {
-    f64::from_bits(1.0f64.to_bits() | (mix(point as u64, number) >> 12))
+    scattered(point as u64, number)
 }
 
 /// The value of an expression at a point where symbols have these values. What has a corner or a jump has a value of its own,

@@ -19,7 +19,7 @@ use super::blocks::{FEW, Row, operations};
 use super::definitions::Definitions;
 use super::points::ROUNDING;
 use super::recognition::{Parameters, Point, Recognition};
-use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind, ZERO, mix};
+use crate::algebra::{Expr, Exprs, Node, Symbol, SymbolKind, ZERO, scattered};
 use crate::bond_graph::Meaning;
 
 /// What is written longer than this keeps a name.
@@ -631,7 +631,7 @@ impl Products {
 /// with a vector from either side are the same.
 fn is_symmetric_by_products(coefficients: &[Vec<(usize, f64)>], signs: &[f64], number: u64) -> bool {
     let (n, all) = (signs.len(), coefficients.len());
-    let vector: Vec<f64> = (0..n).map(|k| entry(number, k)).collect();
+    let vector: Vec<f64> = (0..n).map(|k| scattered(number + 0x5e3d, k as u64)).collect();
     // From the right, with what rounding is measured by.
     let mut values: Vec<(f64, f64)> = vector.iter().map(|&v| (v, v)).collect();
     values.resize(all, (0.0, 0.0));
@@ -659,11 +659,6 @@ fn is_symmetric_by_products(coefficients: &[Vec<(usize, f64)>], signs: &[f64], n
         let difference = signs[k] * right[k].0 - weights[k].0;
         difference.abs() <= ROUNDING * (right[k].1 + weights[k].1)
     })
-}
-
-/// An entry of a vector that is as good as random, between 1 and 2.
-fn entry(number: u64, k: usize) -> f64 {
-    f64::from_bits(1.0f64.to_bits() | (mix(number + 0x5e3d, k as u64) >> 12))
 }
 
 /// Whether so many variables at most stand between some variables and the unknowns, and which of these and of what they read

@@ -387,7 +387,6 @@ fn without_own_columns<C>(rows: &[Vec<C>], columns: usize, number: impl Fn(&C) -
 }
 
 /// Inputs that are looked for in variables, with what is known of these.
-#[derive(Default)]
 pub struct Among {
     inputs: FxHashSet<Symbol>,
     /// Rows over these inputs alone.
