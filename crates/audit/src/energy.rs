@@ -305,12 +305,19 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(V
     if graph.exprs.symbols_of(law).into_iter().any(|s| s != own && values.parameter(s).is_none()) {
         return None;
     }
+    if let Some(line) = values.line(law) {
+        return Some(stored_along(values.times, x, |x| line.where_all_are(x)));
+    }
     let law = EvaluationOrder::new(&graph.exprs, &[law]);
     let numbers: Vec<Option<f64>> = law.symbols().iter().map(|&s| values.parameter(s).filter(|_| s != own)).collect();
     let mut room = Vec::new();
-    let mut z = |x: f64| law.values_in(&mut room, |k| [numbers[k].unwrap_or(x)])[0][0];
+    Some(stored_along(values.times, x, |x| law.values_in(&mut room, |k| [numbers[k].unwrap_or(x)])[0][0]))
+}
+
+/// The same for a law `z` of what is stored, which is `x` at the samples.
+fn stored_along(times: &[f64], x: &[f64], mut z: impl FnMut(f64) -> f64) -> (Vec<f64>, Gains) {
     // What an impulse gives or takes is no power of any sample.
-    let jumps = jumps(values.times, x, JUMPED * greatest(x));
+    let jumps = jumps(times, x, JUMPED * greatest(x));
     let (mut energy, mut gained) = (vec![0.0; x.len()], Vec::new());
     for k in 1..x.len() {
         let change = gauss(x[k - 1], x[k], &mut z);
@@ -318,5 +325,5 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(V
         gained.extend(by_impulse.then_some((k, change)));
         energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { change };
     }
-    Some((energy, gained))
+    (energy, gained)
 }

@@ -3,16 +3,19 @@
 use crate::constraints::Share;
 use crate::scales::{Quantity, Scale, Scales, Settled, Term};
 use crate::terms::Terms;
-use crate::values::{Reader, Values};
+use crate::values::{Line, Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw, TwoPortRow};
-use std::collections::BTreeMap;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A law in values: what stands against what, and the quantity that it is about.
 enum Law<'a> {
     /// Signed columns sum to zero.
     Sum { terms: Vec<(f64, &'a [f64])>, what: &'static str, of: Quantity },
+    /// A recorded column is a sum of numbers times others.
+    Line { left: &'a [f64], right: Line<'a>, what: &'static str, of: Quantity },
     /// A recorded column has the value of an expression.
     Value { left: &'a [f64], right: Expr, what: &'static str, of: Quantity },
     /// Signed columns sum to an expression times another.
@@ -35,6 +38,7 @@ impl Law<'_> {
     /// What it says something of.
     fn what(&self) -> &'static str {
         let (Law::Sum { what, .. }
+        | Law::Line { what, .. }
         | Law::Value { what, .. }
         | Law::Product { what, .. }
         | Law::Row { what, .. }
@@ -45,9 +49,11 @@ impl Law<'_> {
     /// The quantity that it is about as a term of its scale, if it is about one.
     fn natural(&self) -> Option<Term> {
         match self {
-            Law::Sum { of, .. } | Law::Value { of, .. } | Law::Product { of, .. } | Law::Row { of, .. } => {
-                Some(Term::of(*of, 1.0))
-            }
+            Law::Sum { of, .. }
+            | Law::Line { of, .. }
+            | Law::Value { of, .. }
+            | Law::Product { of, .. }
+            | Law::Row { of, .. } => Some(Term::of(*of, 1.0)),
             Law::Zero { .. } => None,
         }
     }
@@ -67,13 +73,41 @@ pub(crate) fn quotients(graph: &BondGraph, x: &mut Exprs) -> Quotients {
 }
 
 /// The elements whose laws have one branch.
-fn fixed(graph: &BondGraph) -> impl Iterator<Item = &Element> {
-    let set_valued: Vec<_> = graph.set_valued.iter().map(|law| law.element).collect();
-    graph.elements.iter().filter(move |(id, _)| !set_valued.contains(id)).map(|(_, element)| element)
+fn fixed(graph: &BondGraph) -> Vec<&Element> {
+    let set_valued: BTreeSet<_> = graph.set_valued.iter().map(|law| law.element).collect();
+    graph.elements.iter().filter(|(id, _)| !set_valued.contains(id)).map(|(_, element)| element).collect()
 }
 
 /// Laws with expressions that are read together at most: what bounds the memory of large models.
 const TOGETHER: usize = 4096;
+
+/// So many elements are looked at in one thread, whatever the machine: what is found does not depend on it.
+const BY_ONE: usize = 1 << 13;
+
+/// What `look` finds of the elements, some thousands at a time, in their order.
+fn on_all_cores<'a, T: Send>(
+    elements: &[&Element],
+    values: &Values<'a>,
+    look: impl Fn(&[&Element], &Values<'a>) -> T + Sync,
+) -> Vec<T> {
+    if elements.len() <= BY_ONE {
+        return vec![look(elements, values)];
+    }
+    let parts: Vec<_> = elements.chunks(BY_ONE).map(|part| (part, values.beside_these())).collect();
+    parts.into_par_iter().map(|(part, values)| look(part, &values)).collect()
+}
+
+/// Does two things that have nothing to do with each other, of large models in two threads.
+pub(crate) fn both_at_once<A: Send, B: Send>(
+    graph: &BondGraph,
+    one: impl FnOnce() -> A + Send,
+    other: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    match graph.elements.len() <= BY_ONE {
+        true => (one(), other()),
+        false => rayon::join(one, other),
+    }
+}
 
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
@@ -83,28 +117,25 @@ pub(crate) fn residual(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    let mut check = Check { graph, values, scales, settled, worst, laws: 0 };
-    let mut written = Vec::new();
+    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
     for (name, symbol, left, right) in values.same() {
         let of = scales.of(graph, symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
     }
-    for element in fixed(graph) {
-        let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
-        laws.of(element);
-        if laws.missing {
-            unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
-        }
-        for law in laws.laws {
-            if let Err(missing) = check.law(&element.name, law, &mut written) {
-                unchecked.push(format!("a law of {}: {missing} is not known", element.name));
-            }
-        }
-        if written.len() >= TOGETHER {
-            check.written(&written);
-            written.clear();
-        }
+    let Check { worst: names, laws: mut before, .. } = check;
+    worst.absorb(0, names, settled);
+    let of_elements = on_all_cores(&fixed(graph), values, |elements, values| {
+        let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
+        let unchecked = check.elements(elements, quotients);
+        (check.worst, check.laws, unchecked)
+    });
+    for (found, laws, missing) in of_elements {
+        worst.absorb(before, found, settled);
+        before += laws;
+        unchecked.extend(missing);
     }
+    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
+    let mut written = Vec::new();
     for share in shares {
         let name = &graph.elements[share.junction].name;
         let checked = match share_of_constraint(values, scales, share) {
@@ -116,6 +147,7 @@ pub(crate) fn residual(
         }
     }
     check.written(&written);
+    worst.absorb(before, check.worst, settled);
 }
 
 /// What a constraint puts on a junction.
@@ -135,13 +167,36 @@ pub(crate) fn links(
     scales: &Scales,
     settled: &Settled,
 ) -> Vec<Link> {
+    // Junctions make nothing of each other's variables that has another size.
+    let mut elements = fixed(graph);
+    elements.retain(|element| !matches!(element.kind, Kind::Zero | Kind::One));
+    on_all_cores(&elements, values, |elements, values| {
+        links_of(elements, (graph, quotients), values, (scales, settled))
+    })
+    .concat()
+}
+
+/// Those of some elements.
+fn links_of(
+    elements: &[&Element],
+    (graph, quotients): (&BondGraph, &Quotients),
+    values: &Values,
+    (scales, settled): (&Scales, &Settled),
+) -> Vec<Link> {
     let mut links = Vec::new();
     let middle = values.times.len() / 2;
-    for element in fixed(graph) {
+    for element in elements {
         let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
         for law in laws.laws {
             match law {
+                Law::Line { right, of, .. } => {
+                    links.push(Link { of, from: Quantity::Number, weight: right.magnitude(middle), straight: false });
+                    let slopes = right.slopes().map(|(symbol, slope)| (scales.of(graph, symbol), slope));
+                    let slopes = slopes.filter(|(from, _)| settled.of(*from) > 0.0);
+                    let tells = tells(settled, slopes.clone());
+                    links.extend(slopes.map(|(from, weight)| Link { of, from, weight, straight: tells(from, weight) }));
+                }
                 Law::Value { right, of, .. } => {
                     let mut parts = vec![right];
                     let terms = Terms::of(&graph.exprs, right, &mut parts);
@@ -323,7 +378,8 @@ impl<'a> Laws<'a, '_> {
         let what = if flow { "its common flow" } else { "its common effort" };
         let of = self.scales.of_bond(element.ports[0].bond, flow);
         let columns: Vec<&[f64]> = element.ports.iter().filter_map(|p| self.column(p.bond, flow)).collect();
-        for pair in columns.windows(2) {
+        // What is recorded once for all of them is common without saying.
+        for pair in columns.windows(2).filter(|pair| !std::ptr::eq(pair[0], pair[1])) {
             self.laws.push(Law::Sum { terms: vec![(1.0, pair[0]), (-1.0, pair[1])], what, of });
         }
     }
@@ -341,8 +397,17 @@ impl<'a> Laws<'a, '_> {
 
     fn value(&mut self, bond: BondId, flow: bool, right: Expr, what: &'static str) {
         if let Some(left) = self.column(bond, flow) {
-            self.laws.push(Law::Value { left, right, what, of: self.scales.of_bond(bond, flow) });
+            let of = self.scales.of_bond(bond, flow);
+            self.told(left, right, what, of);
         }
+    }
+
+    /// A column that has the value of an expression.
+    fn told(&mut self, left: &'a [f64], right: Expr, what: &'static str, of: Quantity) {
+        self.laws.push(match self.values.line(right) {
+            Some(right) => Law::Line { left, right, what, of },
+            None => Law::Value { left, right, what, of },
+        });
     }
 
     fn vanishes(&mut self, bond: BondId, flow: bool, what: &'static str) {
@@ -356,7 +421,7 @@ impl<'a> Laws<'a, '_> {
         match self.values.column(symbol) {
             Some(left) => {
                 let of = self.scales.of(self.graph, symbol);
-                self.laws.push(Law::Value { left, right, what: "its stored quantity", of });
+                self.told(left, right, "its stored quantity", of);
             }
             None => self.missing = true,
         }
@@ -416,7 +481,7 @@ impl Written<'_, '_> {
     /// By how much it is missed at a sample where its expressions have these values.
     fn miss(&self, sample: usize, v: &[f64]) -> f64 {
         match &self.law {
-            Law::Sum { .. } => unreachable!("it has no expressions"),
+            Law::Sum { .. } | Law::Line { .. } => unreachable!("it has no expressions"),
             Law::Value { left, .. } => left[sample] - v[0],
             Law::Product { left, right: (right, _), .. } => {
                 let sum = left.iter().map(|(sign, column)| sign * column[sample]).sum::<f64>();
@@ -440,7 +505,7 @@ impl Written<'_, '_> {
     /// Further terms of its scale there, besides what its variables make of it.
     fn terms(&self, values: &Values, sample: usize, v: &[f64]) -> Vec<Term> {
         match &self.law {
-            Law::Sum { .. } | Law::Zero { .. } => Vec::new(),
+            Law::Sum { .. } | Law::Line { .. } | Law::Zero { .. } => Vec::new(),
             Law::Value { right, .. } => {
                 let mut parts = Vec::new();
                 let terms = Terms::of(values.exprs(), *right, &mut parts);
@@ -461,17 +526,45 @@ struct Check<'a, 'b> {
     values: &'b Values<'a>,
     scales: &'b Scales,
     settled: &'b Settled,
-    worst: &'b mut Worst,
+    worst: Worst,
     /// How many laws there were.
     laws: usize,
 }
 
 impl<'a, 'b> Check<'a, 'b> {
+    /// Checks the laws of elements; says what could not be checked.
+    fn elements(&mut self, elements: &[&'b Element], quotients: &Quotients) -> Vec<String> {
+        let (mut unchecked, mut written) = (Vec::new(), Vec::new());
+        let Check { graph, values, scales, .. } = *self;
+        for &element in elements {
+            let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
+            laws.of(element);
+            if laws.missing {
+                unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
+            }
+            for law in laws.laws {
+                if let Err(missing) = self.law(&element.name, law, &mut written) {
+                    unchecked.push(format!("a law of {}: {missing} is not known", element.name));
+                }
+            }
+            if written.len() >= TOGETHER {
+                self.written(&written);
+                written.clear();
+            }
+        }
+        self.written(&written);
+        unchecked
+    }
+
     /// Checks a law of columns alone; those with expressions are gathered.
     fn law(&mut self, name: &'b str, law: Law<'a>, written: &mut Vec<Written<'b, 'a>>) -> Result<(), String> {
         let parts = match &law {
             Law::Sum { terms, what, of } => {
                 self.sum(name, terms, what, *of);
+                return Ok(());
+            }
+            Law::Line { left, right, what, of } => {
+                self.line(name, (left, right), what, *of);
                 return Ok(());
             }
             Law::Value { right, .. } => vec![*right],
@@ -501,6 +594,24 @@ impl<'a, 'b> Check<'a, 'b> {
         for (k, &time) in self.values.times.iter().enumerate() {
             let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
             self.worst.note_of(self.laws, miss, scale, self.settled, || raw(miss, time, name, what, vec![natural]));
+        }
+    }
+
+    /// A column that is a sum of numbers times others.
+    fn line(&mut self, name: &str, (left, right): (&[f64], &Line), what: &str, of: Quantity) {
+        self.laws += 1;
+        let (graph, scales, settled) = (self.graph, self.scales, self.settled);
+        let natural = Term::of(of, 1.0);
+        let scale = settled.scale(&[natural]);
+        for (k, &time) in self.values.times.iter().enumerate() {
+            let miss = left[k] - right.at(k);
+            self.worst.note_of(self.laws, miss, scale, settled, || {
+                let slopes = right.slopes().map(|(symbol, slope)| (scales.of(graph, symbol), slope));
+                let slopes = slopes.filter(|(from, _)| settled.of(*from) > 0.0);
+                let terms = [natural, Term::beside(Quantity::Number, right.magnitude(k))].into_iter();
+                let terms = terms.chain(slopes.map(|(from, slope)| Term::beside(from, slope))).collect();
+                raw(miss, time, name, what, terms)
+            });
         }
     }
 

@@ -195,10 +195,22 @@ impl Auditor {
         self.scales.absorb_links(&links);
         let settled = self.scales.settled();
         let scales = (&self.scales, &settled);
-        power::power(graph, &values, scales, &mut self.power, &mut unchecked);
-        laws::residual((graph, &self.shares, &self.quotients), &values, scales, &mut self.residual, &mut unchecked);
-        set_valued::residual(graph, &values, scales, &mut self.residual, &mut unchecked);
-        energy::rates(graph, &values, scales, &mut self.rates, &mut unchecked);
+        let Auditor { power, residual, rates, shares, quotients, .. } = self;
+        let beside = values.beside_these();
+        let of_laws = move || {
+            let mut unchecked = Vec::new();
+            laws::residual((graph, shares, quotients), &values, scales, residual, &mut unchecked);
+            set_valued::residual(graph, &values, scales, residual, &mut unchecked);
+            unchecked
+        };
+        let of_flows = move || {
+            let mut unchecked = Vec::new();
+            power::power(graph, &beside, scales, power, &mut unchecked);
+            energy::rates(graph, &beside, scales, rates, &mut unchecked);
+            unchecked
+        };
+        let (missing, also) = laws::both_at_once(graph, of_laws, of_flows);
+        unchecked.extend(missing.into_iter().chain(also));
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
         balance.iter().for_each(|balance| balance.compare_at_once(run.times, &settled, &mut self.at_once));
         for (name, gained) in balance.into_iter().flat_map(|b| b.by_impulses) {

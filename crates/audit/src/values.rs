@@ -85,6 +85,7 @@ impl Columns {
             for &symbol in symbols {
                 match &mut columns.of[symbol.0 as usize] {
                     unknown @ &mut NONE => *unknown = column as u32,
+                    known if *known == column as u32 => {}
                     known => columns.same.push((symbol, column as u32, *known)),
                 }
             }
@@ -146,21 +147,43 @@ pub(crate) struct Values<'a> {
     graph: &'a BondGraph,
     pub times: &'a [f64],
     /// What the samples weigh in integrals.
-    pub quadrature: Quadrature,
+    pub quadrature: Arc<Quadrature>,
     of: &'a Columns,
     columns: &'a [&'a [f64]],
     names: &'a [Arc<str>],
-    parameters: BTreeMap<Symbol, f64>,
+    parameters: Arc<BTreeMap<Symbol, f64>>,
     /// Borders in expressions, as far as they are known.
     borders: RefCell<FxHashMap<Expr, Borders>>,
+    /// Values of expressions that parameters alone tell, as far as they were asked for; `None` of those that read more.
+    numbers: RefCell<FxHashMap<Expr, Option<f64>>>,
 }
 
 impl<'a> Values<'a> {
     pub fn new(graph: &'a BondGraph, of: &'a Columns, run: &Run<'a>) -> Values<'a> {
         let parameters = graph.parameters.values();
-        let parameters = parameters.filter_map(|p| Some((p.symbol, *run.parameters.get(&p.name)?))).collect();
-        let (quadrature, borders) = (Quadrature::new(run.times), RefCell::default());
-        Values { graph, times: run.times, quadrature, of, columns: run.columns, names: run.names, parameters, borders }
+        let parameters = parameters.filter_map(|p| Some((p.symbol, *run.parameters.get(&p.name)?)));
+        Values {
+            graph,
+            times: run.times,
+            quadrature: Arc::new(Quadrature::new(run.times)),
+            of,
+            columns: run.columns,
+            names: run.names,
+            parameters: Arc::new(parameters.collect()),
+            borders: RefCell::default(),
+            numbers: RefCell::default(),
+        }
+    }
+
+    /// The same for another thread: what is known of expressions is found anew.
+    pub fn beside_these(&self) -> Values<'a> {
+        Values {
+            quadrature: self.quadrature.clone(),
+            parameters: self.parameters.clone(),
+            borders: RefCell::default(),
+            numbers: RefCell::default(),
+            ..*self
+        }
     }
 
     /// Columns that say the same as that of a symbol: their names, the symbol, and both.
@@ -206,6 +229,51 @@ impl<'a> Values<'a> {
         let bond = self.graph.bond_of(port);
         let (Some(e), Some(f)) = (self.effort(bond), self.flow(bond)) else { return 0.0 };
         e.iter().zip(f).fold(0.0, |most, (e, f)| most.max((e * f).abs()))
+    }
+
+    /// An expression that is written as a sum of numbers times different recorded variables.
+    pub fn line(&self, e: Expr) -> Option<Line<'a>> {
+        let x = &self.graph.exprs;
+        let terms = match x.node(e) {
+            Node::Add(terms) => &terms[..],
+            _ => &[e][..],
+        };
+        let terms: Vec<LineTerm> = terms.iter().map(|&term| self.line_term(term)).collect::<Option<_>>()?;
+        let moves = |k: usize| terms[k].moved.map(|(symbol, _)| symbol);
+        let repeats = |k: usize| moves(k).is_some() && (0..k).any(|other| moves(other) == moves(k));
+        (!(1..terms.len()).any(repeats)).then_some(Line { terms })
+    }
+
+    fn line_term(&self, term: Expr) -> Option<LineTerm<'a>> {
+        let x = &self.graph.exprs;
+        let factors = match x.node(term) {
+            Node::Mul(factors) => &factors[..],
+            _ => &[term][..],
+        };
+        let mut found = LineTerm { before: 1.0, moved: None, behind: Vec::new() };
+        for &factor in factors {
+            match (self.number(factor), x.node(factor)) {
+                (Some(number), _) if found.moved.is_none() => found.before *= number,
+                (Some(number), _) => found.behind.push(number),
+                (None, &Node::Symbol(symbol)) if found.moved.is_none() => {
+                    found.moved = Some((symbol, self.recorded(symbol).filter(|_| self.rate_of(symbol).is_none())?));
+                }
+                _ => return None,
+            }
+        }
+        Some(found)
+    }
+
+    /// The value of what parameters alone tell.
+    fn number(&self, e: Expr) -> Option<f64> {
+        if let Node::Symbol(symbol) = self.graph.exprs.node(e) {
+            return self.parameter(*symbol);
+        }
+        *self.numbers.borrow_mut().entry(e).or_insert_with(|| {
+            let order = EvaluationOrder::new(&self.graph.exprs, &[e]);
+            let given = order.symbols().iter().all(|symbol| self.parameters.contains_key(symbol));
+            given.then(|| order.values(&mut |symbol| self.parameter(symbol).unwrap_or(f64::NAN))[0])
+        })
     }
 
     /// Reads expressions at samples; the name of what is missing if they read something that was not recorded.
@@ -370,6 +438,50 @@ impl<'a> Values<'a> {
             Meaning::Stored(port) => Some(self.graph.storage_symbols(port)?.1),
             _ => None,
         }
+    }
+}
+
+/// A sum of numbers times different recorded variables.
+pub(crate) struct Line<'a> {
+    terms: Vec<LineTerm<'a>>,
+}
+
+/// A number times a recorded variable, or alone, as factors in the order in which they are written.
+struct LineTerm<'a> {
+    before: f64,
+    moved: Option<(Symbol, &'a [f64])>,
+    behind: Vec<f64>,
+}
+
+impl LineTerm<'_> {
+    fn times(&self, moved: f64) -> f64 {
+        self.behind.iter().fold(self.before * moved, |value, factor| value * factor)
+    }
+
+    fn at(&self, sample: usize) -> f64 {
+        self.moved.map_or(self.before, |(_, column)| self.times(column[sample]))
+    }
+}
+
+impl Line<'_> {
+    /// Its value at a sample, to the bits of a [`Reader`].
+    pub fn at(&self, sample: usize) -> f64 {
+        self.terms.iter().fold(-0.0, |sum, term| sum + term.at(sample))
+    }
+
+    /// Its value where all variables in it have this one.
+    pub fn where_all_are(&self, value: f64) -> f64 {
+        self.terms.iter().fold(-0.0, |sum, term| sum + term.moved.map_or(term.before, |_| term.times(value)))
+    }
+
+    /// The sum of the magnitudes of its terms at a sample.
+    pub fn magnitude(&self, sample: usize) -> f64 {
+        self.terms.iter().map(|term| term.at(sample).abs()).sum()
+    }
+
+    /// The variables with how steep it is in each, whichever way.
+    pub fn slopes(&self) -> impl Iterator<Item = (Symbol, f64)> + Clone + '_ {
+        self.terms.iter().filter_map(|term| Some((term.moved?.0, term.times(1.0).abs())))
     }
 }
 

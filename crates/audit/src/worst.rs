@@ -68,6 +68,14 @@ impl Worst {
         }
     }
 
+    /// Takes over what was found of laws with the numbers after `first`.
+    pub fn absorb(&mut self, first: usize, other: Worst, settled: &Settled) {
+        self.leaves_open(other.open);
+        if let Some((_, raw)) = other.now {
+            self.keep_of(other.law.saturating_add(first), raw, settled);
+        }
+    }
+
     /// So much is left open somewhere, relative to what is there.
     pub fn leaves_open(&mut self, resolution: f64) {
         self.open = self.open.max(resolution);

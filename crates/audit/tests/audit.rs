@@ -103,6 +103,53 @@ fn any_single_wrong_value_is_found() {
     }
 }
 
+/// What a law is missed by does not depend on how it is written: as numbers times variables, or as something that only comes to
+/// the same.
+#[test]
+fn laws_of_straight_lines_are_measured_as_others_are() {
+    let straight = graph(MODEL);
+    let bent = MODEL.replace("R:damper(2*d)", "R:damper(e = 2*d*(f + 1e-300*f^3))");
+    let bent = graph(&bent.replace("C:spring(k = 4)", "C:spring(e = 4*(q + 1e-300*q^3))"));
+    let (times, columns) = motion(100);
+    for (name, off) in [("damper.e", 1e-3), ("damper.f", 1e-6), ("spring.q", 1e-9), ("spring.e", 3.0), ("mass.p", 1e-4)]
+    {
+        let mut wrong = columns.clone();
+        wrong.get_mut(name).unwrap()[40] *= 1.0 + off;
+        let [one, other] = [&straight, &bent].map(|graph| check(graph, &times, &wrong));
+        for (one, other) in [(one.residual, other.residual), (one.rates, other.rates), (one.energy, other.energy)] {
+            let (one, other) = (one.unwrap(), other.unwrap());
+            assert_eq!((one.time, &one.place), (other.time, &other.place), "{name}");
+            assert!((one.value - other.value).abs() <= 1e-6 * other.value, "{name}: {one}, {other}");
+        }
+    }
+}
+
+/// Large models are looked at in parts; one wrong value is found in whichever it is.
+#[test]
+fn a_wrong_value_is_found_among_thousands_of_laws() {
+    const MANY: usize = 20_000;
+    let text = format!("model Net\nSe:u(1 V) -> 0:n\nfor i in 1..{MANY} {{\n    n -> R:r[i](i * 1 ohm)\n}}\n");
+    let graph = graph(&text);
+    let mut columns = Columns::new();
+    let mut add = |name: String, value: f64| _ = columns.insert(name, vec![value; 2]);
+    for i in 1..=MANY {
+        add(format!("r[{i}].e"), 1.0);
+        add(format!("r[{i}].f"), 1.0 / i as f64);
+    }
+    add("n.e".to_string(), 1.0);
+    add("u.e".to_string(), 1.0);
+    add("u.f".to_string(), (1..=MANY).map(|i| 1.0 / i as f64).sum());
+    let found = check(&graph, &[0.0, 1.0], &columns);
+    assert!(found.unchecked.is_empty() && found.residual.as_ref().unwrap().value < 1e-13, "{found}");
+    for i in [1, 8_192, 8_193, MANY] {
+        let mut wrong = columns.clone();
+        wrong.get_mut(&format!("r[{i}].f")).unwrap()[1] *= 2.0;
+        let residual = check(&graph, &[0.0, 1.0], &wrong).residual.unwrap();
+        assert_eq!((residual.time, residual.place), (1.0, format!("r[{i}]: its law")));
+        assert!((residual.value - 1.0).abs() < 1e-4, "{}", residual.value);
+    }
+}
+
 #[test]
 fn a_run_that_drifts_is_found_by_its_rates() {
     let graph = graph(MODEL);
