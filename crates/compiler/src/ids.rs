@@ -159,7 +159,12 @@ impl<K: Id, V: Clone> Map<K, V> {
     /// Puts a value in the place of an id; gives what was there.
     pub fn insert(&mut self, id: K, value: V) -> Option<V> {
         let places = Arc::make_mut(&mut self.places);
-        if places.len() <= id.index() {
+        if places.len() == id.index() {
+            places.push(Some((id, value)));
+            self.len += 1;
+            return None;
+        }
+        if places.len() < id.index() {
             places.resize_with(id.index() + 1, || None);
         }
         let before = places[id.index()].replace((id, value));

@@ -195,7 +195,7 @@ impl Exprs {
 
     /// The entry of a node that is in canonical form.
     pub(super) fn intern(&mut self, node: Node) -> Expr {
-        let hash = self.hash_of(&node);
+        let Whole { hash, depth, size } = self.whole_of(&node);
         let entries = &self.entries;
         if let Some(&id) = self.ids.find(hash, |&id| entries[id as usize].node == node) {
             return Expr(id);
@@ -203,8 +203,8 @@ impl Exprs {
         let monomial = self.monomial_of(&node);
         let entry = PoolEntry {
             hash,
-            depth: self.depth_of(&node),
-            size: self.size_of(&node),
+            depth,
+            size,
             length: self.length_of_node(&node),
             properties: self.properties_of(&node),
             symbols: self.symbols_of_node(&node),
@@ -229,28 +229,11 @@ impl Exprs {
         })
     }
 
-    fn depth_of(&self, node: &Node) -> u32 {
-        if matches!(node, Node::Whole(_)) {
-            return 1;
-        }
-        let mut depth = 0;
-        node.for_each_child(|c| depth = depth.max(self.entry(c).depth + 1));
-        depth
-    }
-
-    fn size_of(&self, node: &Node) -> u32 {
-        let mut size = 1u32;
-        if matches!(node, Node::Whole(_)) {
-            return size;
-        }
-        node.for_each_child(|c| size = size.saturating_add(self.entry(c).size));
-        size
-    }
-
-    fn hash_of(&self, node: &Node) -> u64 {
+    /// What an entry is as a whole, from that of its parts.
+    fn whole_of(&self, node: &Node) -> Whole {
         let seed = match node {
-            Node::Number(value) => return hash_number(value),
-            Node::Symbol(s) => return self.symbols[s.0 as usize].hash,
+            Node::Number(value) => return Whole { hash: hash_number(value), depth: 0, size: 1 },
+            Node::Symbol(s) => return Whole { hash: self.symbols[s.0 as usize].hash, depth: 0, size: 1 },
             Node::Pi => 1,
             Node::Add(_) => 2,
             Node::Mul(_) => 3,
@@ -265,10 +248,25 @@ impl Exprs {
             Node::Whole(_) => 11,
             Node::Call(f, _) => 32 + function_tag(*f),
         };
-        let mut hash = mix(0x5eed, seed);
-        node.for_each_child(|c| hash = mix(hash, self.entry(c).hash));
-        hash
+        let mut whole = Whole { hash: mix(0x5eed, seed), depth: 0, size: 1 };
+        node.for_each_child(|c| {
+            let part = self.entry(c);
+            whole.hash = mix(whole.hash, part.hash);
+            whole.depth = whole.depth.max(part.depth + 1);
+            whole.size = whole.size.saturating_add(part.size);
+        });
+        match node {
+            Node::Whole(_) => Whole { depth: 1, size: 1, ..whole },
+            _ => whole,
+        }
     }
+}
+
+/// What is known of an entry from its parts.
+struct Whole {
+    hash: u64,
+    depth: u32,
+    size: u32,
 }
 
 pub(super) fn function_tag(f: Function) -> u64 {

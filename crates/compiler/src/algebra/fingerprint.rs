@@ -60,7 +60,21 @@ impl Exprs {
     }
 
     fn lanes(&self, node: &Node) -> Fingerprint {
-        std::array::from_fn(|lane| self.lane(node, lane).unwrap_or(POISON))
+        let joined = |parts: &[Expr], start: u64, join: fn(u64, u64) -> u64| {
+            parts.iter().fold([start; LANES], |all, &part| {
+                let more = self.fingerprint(part);
+                std::array::from_fn(|lane| match (all[lane], more[lane]) {
+                    (POISON, _) | (_, POISON) => POISON,
+                    (a, b) => join(a, b),
+                })
+            })
+        };
+        match node {
+            Node::Add(terms) => joined(terms, 0, field::add),
+            Node::Mul(factors) => joined(factors, 1, field::mul),
+            Node::Symbol(symbol) => self.lanes_of_symbol(*symbol),
+            _ => std::array::from_fn(|lane| self.lane(node, lane).unwrap_or(POISON)),
+        }
     }
 
     fn at(&self, e: Expr, lane: usize) -> Option<u64> {
@@ -71,9 +85,7 @@ impl Exprs {
         match node {
             Node::Number(value) => residue(value),
             Node::Pi => Some(random(lane, 0x3141)),
-            Node::Symbol(s) => self.lane_of_symbol(*s, lane),
-            Node::Add(terms) => terms.iter().try_fold(0, |sum, &t| Some(field::add(sum, self.at(t, lane)?))),
-            Node::Mul(factors) => factors.iter().try_fold(1, |all, &f| Some(field::mul(all, self.at(f, lane)?))),
+            Node::Symbol(_) | Node::Add(_) | Node::Mul(_) => Some(self.lanes(node)[lane]).filter(|&v| v != POISON),
             Node::Pow(base, n) => self.lane_of_power(*base, *n, lane),
             Node::Call(f, x) => self.lane_of_call(*f, x, lane),
             Node::Compare(c, a, b) => {
@@ -95,14 +107,14 @@ impl Exprs {
         }
     }
 
-    fn lane_of_symbol(&self, symbol: Symbol, lane: usize) -> Option<u64> {
+    fn lanes_of_symbol(&self, symbol: Symbol) -> Fingerprint {
         let facts = self.facts(symbol);
-        if let (true, Some(given)) = (GIVEN.contains(&lane), facts.given) {
-            return self.at(given, lane);
-        }
         let key = self.label(symbol).bytes().fold(0x51, |h, b| mix(h, u64::from(b)));
-        let value = random(lane, key);
-        Some(if facts.positive { field::pow(value, field::INTO_ROOTED) } else { value })
+        std::array::from_fn(|lane| match facts.given {
+            Some(given) if GIVEN.contains(&lane) => self.fingerprint(given)[lane],
+            _ if facts.positive => field::pow(random(lane, key), field::INTO_ROOTED),
+            _ => random(lane, key),
+        })
     }
 
     fn lane_of_power(&self, base: Expr, n: Expr, lane: usize) -> Option<u64> {

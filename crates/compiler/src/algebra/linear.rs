@@ -55,6 +55,20 @@ impl Exprs {
         self.invert(zero, ZERO, symbol)
     }
 
+    /// Solves `left = right` for a symbol that is a factor of the right side and stands nowhere else, as in the law of a linear
+    /// resistor. `None` for anything else.
+    pub fn solve_product(&mut self, left: Expr, right: Expr, symbol: Symbol) -> Option<Expr> {
+        let Node::Mul(factors) = self.node(right) else { return None };
+        let is_own = |f: &Expr| *self.node(*f) == Node::Symbol(symbol);
+        let (own, others): (Parts, Parts) = factors.iter().copied().partition(is_own);
+        let reads_it = |x: &Exprs, e: Expr| x.depends_on(e, symbol);
+        if own.len() != 1 || reads_it(self, left) || others.iter().any(|&f| reads_it(self, f)) {
+            return None;
+        }
+        let coefficient = self.mul(&others);
+        self.divide(left, coefficient)
+    }
+
     /// Whether an expression is a sum of which one term is the symbol or a product with it, and no other reads it.
     pub fn is_plainly_linear(&self, e: Expr, symbol: Symbol) -> bool {
         let Node::Add(terms) = self.node(e) else { return false };

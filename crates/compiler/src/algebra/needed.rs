@@ -135,6 +135,9 @@ impl Exprs {
                 _ => compound.push((e, claim)),
             }
         }
+        if compound.is_empty() {
+            return needed;
+        }
         // With what single parameters need most claims hold: these are told in one go.
         let mut signs = self.all_signs_by(&needed, may_change);
         for (e, claim) in compound {

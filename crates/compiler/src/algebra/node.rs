@@ -213,6 +213,7 @@ impl Node {
     }
 
     /// Calls `visit` with each entry it is made of, in order.
+    #[inline]
     pub fn for_each_child(&self, mut visit: impl FnMut(Expr)) {
         match self {
             Node::Number(_) | Node::Pi | Node::Symbol(_) => {}

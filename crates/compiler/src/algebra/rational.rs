@@ -235,6 +235,7 @@ impl Rational {
         }
     }
 
+    #[inline]
     fn reduced(n: i128, d: i128) -> Self {
         let g = if d == 1 { 1 } else { gcd(n.unsigned_abs(), d.unsigned_abs()) as i128 } * d.signum();
         let (n, d) = if g == 1 { (n, d) } else { (n / g, d / g) };
@@ -254,7 +255,10 @@ fn gcd(a: u128, b: u128) -> u128 {
 
 impl From<i64> for Rational {
     fn from(n: i64) -> Self {
-        Self::reduced(i128::from(n), 1)
+        match n {
+            i64::MIN => Self::reduced(i128::from(n), 1),
+            _ => Rational(Repr::Small(n, 1)),
+        }
     }
 }
 
@@ -265,7 +269,7 @@ macro_rules! operator {
             fn $method(self, other: &Rational) -> Rational {
                 match (&self.0, &other.0) {
                     (Repr::Small($a, $b), Repr::Small($c, $d)) => {
-                        let [$a, $b, $c, $d] = [*$a, *$b, *$c, *$d].map(i128::from);
+                        let ($a, $b, $c, $d) = (i128::from(*$a), i128::from(*$b), i128::from(*$c), i128::from(*$d));
                         $small
                     }
                     _ => Rational::from_big($trait::$method(self.to_big(), other.to_big())),
@@ -286,7 +290,11 @@ operator!(Sub, sub, |a, b, c, d| if b == 1 && d == 1 {
 } else {
     Rational::reduced(a * d - c * b, b * d)
 });
-operator!(Mul, mul, |a, b, c, d| Rational::reduced(a * c, b * d));
+operator!(Mul, mul, |a, b, c, d| if b == 1 && d == 1 {
+    Rational::reduced(a * c, 1)
+} else {
+    Rational::reduced(a * c, b * d)
+});
 
 impl Neg for &Rational {
     type Output = Rational;

@@ -195,6 +195,8 @@ pub(super) struct Builder<'a, 'f> {
     pub held_displacements: Vec<HeldDisplacement>,
     /// What sources carry, by their parts.
     pub carried: BTreeMap<usize, Expr>,
+    /// Dimensions that coefficients have, by their letters, and that are not those of what is one over them.
+    pub plain: Vec<(u8, Dim)>,
     /// Dimensions of the moduli of two-ports.
     pub moduli: BTreeMap<usize, Quantity>,
     /// Stored quantities of every port of every part.
@@ -257,6 +259,7 @@ impl<'a, 'f> Builder<'a, 'f> {
             roles: Vec::with_capacity(2 * wiring.wires.len() + flat.parts.len()),
             pairs: Vec::with_capacity(wiring.wires.len()),
             moduli: BTreeMap::new(),
+            plain: Vec::new(),
             common: representatives(flat, wiring),
             beyond: BTreeMap::new(),
             reactions: Vec::new(),

@@ -956,6 +956,10 @@ impl<'a> Builder<'a, '_> {
     /// Says so if the unit is that of one over the coefficient.
     fn inverse_meant(&mut self, part: usize, letter: &str, bare: bool, value: &Value, arg: &Arg) -> bool {
         let Some(dim) = self.dims.value(&value.quantity) else { return false };
+        let own = (letter.as_bytes()[0], dim);
+        if self.plain.contains(&own) {
+            return false;
+        }
         let compliance = |d: Domain| d.flow().times(Dim::SECOND).over(d.effort());
         let resistance = |d: Domain| d.effort().over(d.flow());
         let any = |of: &dyn Fn(Domain) -> Dim, wanted: Dim| Domain::ALL.into_iter().any(|d| of(d) == wanted);
@@ -964,7 +968,10 @@ impl<'a> Builder<'a, '_> {
             "k" if !any(&compliance, dim.inverse()) && any(&compliance, dim) => ("c", "a compliance", "stiffness"),
             "r" if !any(&resistance, dim) && any(&resistance, dim.inverse()) => ("g", "a conductance", "resistance"),
             "g" if !any(&resistance, dim.inverse()) && any(&resistance, dim) => ("r", "a resistance", "conductance"),
-            _ => return false,
+            _ => {
+                self.plain.push(own);
+                return false;
+            }
         };
         let p = self.part(part);
         let text = self.sources.slice(arg.value.span).to_string();

@@ -1,6 +1,7 @@
 //! What defines each variable, and the time derivative of anything.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
@@ -99,6 +100,17 @@ impl<'a> Definitions<'a> {
         self.of.insert(symbol, Definition::Explicit(value));
     }
 
+    /// Defines a symbol as what makes two sides equal.
+    pub fn set_equal(&mut self, symbol: Symbol, left: Expr, right: Expr) {
+        match self.x.solve_product(left, right, symbol).filter(|&value| self.is_safe(value)) {
+            Some(value) => self.set(symbol, value),
+            None => {
+                let residual = self.x.sub(left, right);
+                self.set_root(symbol, residual);
+            }
+        }
+    }
+
     /// Defines a symbol as what makes an expression vanish; solved for it where that can be written down. A nonlinear
     /// expression is kept as well: Newton works on laws as written, since an inverse may end where the law saturates.
     pub fn set_root(&mut self, symbol: Symbol, residual: Expr) {
@@ -153,9 +165,12 @@ impl<'a> Definitions<'a> {
 
     /// The root of an expression, if it can be written down without dividing by what may vanish.
     pub fn solve_for(&mut self, residual: Expr, symbol: Symbol) -> Option<Expr> {
-        let root = self.x.solve_for(residual, symbol)?;
-        let safe = self.x.divisors(root).into_iter().all(|d| self.x.nonzero(d));
-        safe.then_some(root)
+        self.x.solve_for(residual, symbol).filter(|&root| self.is_safe(root))
+    }
+
+    /// Whether an expression divides by nothing that may vanish.
+    fn is_safe(&self, e: Expr) -> bool {
+        self.x.divisors(e).into_iter().all(|divisor| self.x.nonzero(divisor))
     }
 
     /// Makes a symbol a state; gives the symbol of its rate.
@@ -247,7 +262,7 @@ impl<'a> Definitions<'a> {
             Some(Meaning::Parameter(_)) => return Ok(self.x.int(0)),
             Some(Meaning::Time) => return Ok(self.x.int(1)),
             Some(Meaning::Input(input)) => {
-                return Err(Unavailable::NeedsRateOf(self.graph.inputs[input].name.clone()));
+                return Err(Unavailable::NeedsRateOf(Arc::new(self.graph.inputs[input].name.clone())));
             }
             // The rate of a rate of an input, which nobody gives.
             Some(Meaning::Rate(of)) if matches!(self.meaning(of), Some(Meaning::Input(_))) => return self.rate_of(of),
@@ -255,7 +270,7 @@ impl<'a> Definitions<'a> {
             Some(Meaning::Held(held)) => match self.graph.held[held].kind {
                 HeldKind::Sample | HeldKind::Discrete | HeldKind::Impulse => return Ok(self.x.int(0)),
                 HeldKind::Delay => {
-                    return Err(Unavailable::NeedsRateOf(self.graph.held[held].name.clone()));
+                    return Err(Unavailable::NeedsRateOf(Arc::new(self.graph.held[held].name.clone())));
                 }
             },
             _ => {}
@@ -264,7 +279,7 @@ impl<'a> Definitions<'a> {
             return Ok(self.x.sym(rate));
         }
         if self.free.contains(&symbol) {
-            return Err(Unavailable::NeedsRateOfUnknown(self.x.name(symbol).to_string()));
+            return Err(Unavailable::NeedsRateOfUnknown(Arc::new(self.x.name(symbol).to_string())));
         }
         let Some(&definition) = self.of.get(&symbol) else { return Err(Unavailable::Unsolvable) };
         let rate = self.rate_symbol(symbol);

@@ -481,7 +481,7 @@ fn needs_rate(graph: &BondGraph, x: &Exprs, symbol: Symbol, reason: &Unavailable
         Unavailable::Undetermined => return not_determined(graph, symbol, &name),
         Unavailable::NeedsRateOfUnknown(unknown) => return needs_rate_of_unknown(graph, symbol, &name, unknown).into(),
     };
-    let span = graph.inputs.values().find(|i| i.name == input).map(|i| i.span).unwrap_or_default();
+    let span = graph.inputs.values().find(|i| i.name == *input).map(|i| i.span).unwrap_or_default();
     Diagnostic::error(
         codes::E001,
         format!("the equation of {name} needs the time derivative of {input}"),

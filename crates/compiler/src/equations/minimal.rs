@@ -238,8 +238,7 @@ impl<'a> Assembled<'a> {
         // Written the other way round: the law gives what the junction structure gives too.
         let given = self.d.x.sym(given);
         let given = self.own(causal, state, given);
-        let residual = self.d.x.sub(given, law);
-        self.d.set_root(state.input, residual);
+        self.d.set_equal(state.input, given, law);
     }
 
     /// A constraint that is met as a law: it gives what it imposes, or an unknown that makes the imposed variable right.

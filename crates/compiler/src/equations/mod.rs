@@ -359,15 +359,15 @@ pub enum ObservedKind {
     Named,
 }
 
-/// Why a variable has no value.
+/// Why a variable has no value; as small as what it stands in the place of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unavailable {
     /// The junction structure does not determine it.
     Undetermined,
     /// It needs the time derivative of this input.
-    NeedsRateOf(String),
+    NeedsRateOf(Arc<String>),
     /// It needs the rate of this unknown, which the form does not have.
-    NeedsRateOfUnknown(String),
+    NeedsRateOfUnknown(Arc<String>),
     /// It needs a rate that is only defined through itself.
     Unsolvable,
 }

@@ -49,18 +49,21 @@ pub fn observed(
     let mut count = states.len() + positions.len();
     variables(graph, &mut |_, _, _| count += 1);
     let mut all: Vec<Observed> = Vec::with_capacity(count);
-    let mut taken: HashTable<u32> = HashTable::with_capacity(count);
+    let mut taken: HashTable<u32> = HashTable::new();
     let hash = |name: &str| FxBuildHasher.hash_one(name);
-    let mut add = |name: &str, value, unit, kind, default| {
+    let mut add = |name: &str, value, (unit, kind, default), is_unique: bool| {
         let at = hash(name);
         if taken.find(at, |&i| *all[i as usize].name == *name).is_none() {
-            taken.insert_unique(at, all.len() as u32, |&i| hash(&all[i as usize].name));
+            // A large model has many variables of bonds; their names are no one else's but a state's.
+            if !is_unique {
+                taken.insert_unique(at, all.len() as u32, |&i| hash(&all[i as usize].name));
+            }
             all.push(Observed { name: name.into(), value, unit, kind, default });
         }
     };
     for state in states {
         let value = d.x.sym(state.symbol);
-        add(&state.name, Ok(value), state.unit.clone(), kind_of(d, state), true);
+        add(&state.name, Ok(value), (state.unit.clone(), kind_of(d, state), true), false);
     }
     for position in positions {
         let value = d.x.sym(position.symbol);
@@ -68,58 +71,63 @@ pub fn observed(
             Some(Meaning::Stored(_)) => ObservedKind::Displacement,
             _ => ObservedKind::Signal,
         };
-        add(&position.name, Ok(value), position.unit.clone(), kind, true);
+        add(&position.name, Ok(value), (position.unit.clone(), kind, true), false);
     }
     for (list, default) in [(&graph.outputs, true), (&graph.lets, false)] {
         for named in list {
             let named_value = if whole.is_empty() { named.value } else { d.x.substitute(named.value, &whole) };
             let value = value_of(d, named_value);
-            add(&named.name, value, named.unit.clone(), ObservedKind::Named, default);
+            add(&named.name, value, (named.unit.clone(), ObservedKind::Named, default), false);
         }
     }
     for constraint in &graph.constraints {
         if !constraint.drawn {
             let value = value_of(d, constraint.multiplier);
-            add(&format!("{}.e", constraint.name), value, None, ObservedKind::Effort, false);
+            add(&format!("{}.e", constraint.name), value, (None, ObservedKind::Effort, false), false);
         }
         if constraint.holonomic {
             let drift = value_of(d, constraint.expr);
-            add(&format!("{}.drift", constraint.name), drift, None, ObservedKind::Drift, false);
+            add(&format!("{}.drift", constraint.name), drift, (None, ObservedKind::Drift, false), false);
         }
     }
     variables(graph, &mut |name, kind, symbol| {
         let e = whole.get(&symbol).copied().unwrap_or_else(|| d.x.sym(symbol));
         let value = value_of(d, e);
         let unit: Option<Unit> = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
-        add(name, value, unit, kind, false);
+        add(name, value, (unit, kind, false), true);
     });
     for signal in graph.signals.values() {
         let e = d.x.sym(signal.symbol);
         let value = value_of(d, e);
-        add(&signal.name, value, signal.unit.clone(), ObservedKind::Signal, false);
+        add(&signal.name, value, (signal.unit.clone(), ObservedKind::Signal, false), false);
     }
     for held in graph.held.values().filter(|h| h.kind.is_discrete()) {
         let e = d.x.sym(held.symbol);
         let unit = graph.variables.get(&held.symbol).and_then(|v| v.unit.clone());
-        add(&held.name, Ok(e), unit, ObservedKind::Signal, held.kind == HeldKind::Discrete);
+        add(&held.name, Ok(e), (unit, ObservedKind::Signal, held.kind == HeldKind::Discrete), false);
     }
     for input in graph.inputs.values() {
         let e = d.x.sym(input.symbol);
-        add(&input.name, Ok(e), input.unit.clone(), ObservedKind::Input, false);
+        add(&input.name, Ok(e), (input.unit.clone(), ObservedKind::Input, false), false);
     }
     for named in graph.shapes.iter().flat_map(Shape::values) {
         let value = value_of(d, named.value);
-        add(&named.name, value, named.unit.clone(), ObservedKind::Named, false);
+        add(&named.name, value, (named.unit.clone(), ObservedKind::Named, false), false);
     }
     if graph.elements.values().any(|e| e.carries.is_some()) {
         variables(graph, &mut |name, kind, symbol| {
             if kind == ObservedKind::Effort {
                 let e = d.x.sym(symbol);
                 let unit = graph.variables.get(&symbol).and_then(|v| v.unit.clone());
-                add(&bare_name(name), value_of(d, e), unit, ObservedKind::Bare, false);
+                add(&bare_name(name), value_of(d, e), (unit, ObservedKind::Bare, false), true);
             }
         });
     }
+    debug_assert_eq!(
+        all.iter().map(|o| &o.name).collect::<BTreeSet<_>>().len(),
+        all.len(),
+        "each has a name of its own"
+    );
     all
 }
 

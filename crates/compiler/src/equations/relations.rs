@@ -8,6 +8,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use super::definitions::Definitions;
 use super::minimal::{Assembled, Chosen};
 use super::rows::without_own;
@@ -91,23 +93,23 @@ fn are_long(assembled: &mut Assembled, ports: &Ports, states: &[&Chosen]) -> boo
 struct Ports<'a> {
     causal: &'a CausalGraph,
     /// Rates of dependent storages, with what they are rates of.
-    dependent: BTreeMap<Symbol, Symbol>,
+    dependent: FxHashMap<Symbol, Symbol>,
     /// What elements are free to give: co-energies of independent storages, algebraic laws, sources that read what moves.
-    free: BTreeSet<Symbol>,
+    free: FxHashSet<Symbol>,
     /// Flows given by sources that read what moves, with their values.
-    sources: BTreeMap<Symbol, Expr>,
+    sources: FxHashMap<Symbol, Expr>,
     /// Independent storages, by co-energy variable and by stored quantity.
-    independent: BTreeMap<Symbol, &'a PortState>,
+    independent: FxHashMap<Symbol, &'a PortState>,
 }
 
 impl<'a> Ports<'a> {
     fn of(d: &Definitions, causal: &'a CausalGraph) -> Ports<'a> {
         let mut ports = Ports {
             causal,
-            dependent: BTreeMap::new(),
-            free: BTreeSet::new(),
-            sources: BTreeMap::new(),
-            independent: BTreeMap::new(),
+            dependent: FxHashMap::default(),
+            free: FxHashSet::default(),
+            sources: FxHashMap::default(),
+            independent: FxHashMap::default(),
         };
         for port in &causal.ports.ports {
             if port.role == Role::Independent {

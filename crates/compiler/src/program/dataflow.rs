@@ -34,8 +34,8 @@ impl<'a> Dataflow<'a> {
         // A large block is read by as many values as it has unknowns.
         let mut seen = vec![false; self.blocks.len()];
         for (value, op) in self.values.iter().rev() {
-            let ends = (!deep && self.values.reads(value) == Reads::PARAMETERS) || given.contains(&value);
-            if !live[value.index()] || ends {
+            let ends = || (!deep && self.values.reads(value) == Reads::PARAMETERS) || given.contains(&value);
+            if !live[value.index()] || ends() {
                 continue;
             }
             match op {

@@ -90,7 +90,7 @@ pub(super) fn share(x: &Exprs, exprs: &[Expr], varies: &dyn Fn(Expr) -> bool) ->
     }
     sharing.reciprocals = uses.into_iter().filter(|(_, count)| *count > 1).map(|(e, _)| e).collect();
     products.extend(sums);
-    products.sort_unstable_by_key(|whole| whole.0);
+    products.sort_by_key(|whole| whole.0);
     sharing.all = products;
     sharing
 }
@@ -182,10 +182,9 @@ impl Sharing {
         }
         // A pair with what is there once is never found twice.
         let often = |unit: UnitId| where_[unit as usize].len() > 1;
-        for (pair, n) in bags.iter().flat_map(|(_, bag)| pairs(&bag.units)) {
-            if often(pair.0) && often(pair.1) {
-                *count.entry(pair).or_default() += n;
-            }
+        for (_, bag) in bags.iter() {
+            let shared: Bag = bag.units.iter().copied().filter(|unit| often(unit.1)).collect();
+            pairs(&shared).into_iter().for_each(|(pair, n)| *count.entry(pair).or_default() += n);
         }
         // Most found first; among equals the first.
         let entry = |pair: Pair, n: usize| (n, std::cmp::Reverse(pair));

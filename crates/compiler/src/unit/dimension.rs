@@ -50,8 +50,11 @@ impl Dimension {
 
     /// Of a power, the exponent in sixtieths; `None` if an exponent of the result is no multiple of 1/60 or absurd.
     pub fn power(self, sixtieths: i32) -> Option<Dimension> {
+        if sixtieths == WHOLE {
+            return Some(self);
+        }
         let mut result = [0; 7];
-        for (r, a) in result.iter_mut().zip(self.0) {
+        for (r, a) in result.iter_mut().zip(self.0).filter(|(_, a)| *a != 0) {
             let product = i64::from(a) * i64::from(sixtieths);
             if product % i64::from(WHOLE) != 0 {
                 return None;

@@ -6,7 +6,7 @@ use super::{Model, RecordError};
 use crate::bytecode::{BlockBatches, Routine};
 use halfarrow_compiler::bond_graph::HeldKind;
 use halfarrow_compiler::program::{BlockId, Op, Value};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
 /// A choice of what is recorded. Never changed; shared by copies of a model.
@@ -28,9 +28,9 @@ impl Recorded {
         let value = |&i: &usize| mode.program.observed[i].value.clone().ok();
         let wanted: Vec<Value> = chosen.iter().filter_map(value).collect();
         let routine = mode.layout.guarded_routine(&mode.program, &wanted);
-        let of_rates = |block: &BlockId| mode.rates.solves.iter().any(|s| s.block == *block);
+        let of_rates: FxHashSet<BlockId> = mode.rates.solves.iter().map(|s| s.block).collect();
         let newton = routine.solves.iter().filter(|s| !s.guess.is_empty()).map(|s| s.block);
-        let blocks: Vec<BlockId> = newton.filter(|block| !of_rates(block)).collect();
+        let blocks: Vec<BlockId> = newton.filter(|block| !of_rates.contains(block)).collect();
         let motion = Motion::of(&mode.program, &mode.layout, &blocks);
         let batches = BlockBatches::of(&mode.program, &mode.layout, &routine).map(Arc::new);
         Recorded { chosen, routine, batches, blocks, motion }
