@@ -386,7 +386,7 @@ pub struct Simulate {
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub to: f64,
     /// Time between recorded points, in s; without it every step is recorded, of methods of variable step with three points
-    /// inside (of the first 2000 steps, with up to 500 variables)
+    /// inside (of the first 2000 steps, with up to 500 variables of at most 20,000)
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// The formulation

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use beside::{Part, PlacedAuditor, Recorded, look};
 use halfarrow_audit::{self as audit, Audit, Finding};
 use halfarrow_compiler::bond_graph::{BondGraph, Kind};
+use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::program::{Observed, ObservedKind, bare_name};
 use halfarrow_exec as exec;
 use halfarrow_sim::{
@@ -25,7 +26,7 @@ use crate::verdict::Verdict;
 
 /// Samples audited at once at most, and at least: what bounds the memory of long runs.
 const CHUNK: usize = 4096;
-const LEAST: usize = 256;
+const LEAST: usize = 64;
 /// Values kept for the next audit, of models that have many.
 const KEPT: usize = 1 << 22;
 
@@ -196,7 +197,9 @@ struct Wanted<'p> {
     next: [usize; 3],
     /// What is a source or a signal.
     special: FxHashMap<String, Origin>,
-    /// The column of each, if it has one.
+    /// Whether what has one value has it in all modes of the model: it is recorded once then, whatever its names.
+    in_all_modes: bool,
+    /// The column of each value of the program, or of each name, if it has one.
     columns: Vec<u32>,
     /// What is recorded for the audit, in the order of the columns.
     chosen: Vec<usize>,
@@ -228,7 +231,8 @@ impl<'p> Wanted<'p> {
             index_of: OnceCell::new(),
             next: [0, variables, variables],
             special,
-            columns: vec![NONE; observed.len()],
+            in_all_modes: graph.set_valued.is_empty(),
+            columns: Vec::new(),
             chosen: Vec::new(),
             origins: Vec::new(),
         }
@@ -238,10 +242,12 @@ impl<'p> Wanted<'p> {
     fn index_of(&mut self, name: &str) -> Option<usize> {
         let all = self.observed;
         let is_it = |i: &usize| *all[*i].name == *name && all[*i].value.is_ok();
-        for next in &mut self.next {
-            if let Some(found) = (*next..all.len().min(*next + NEAR)).find(is_it) {
-                *next = found + 1;
-                return Some(found);
+        for far in 0..NEAR {
+            for next in &mut self.next {
+                if let Some(found) = Some(*next + far).filter(|at| *at < all.len()).filter(is_it) {
+                    *next = found + 1;
+                    return Some(found);
+                }
             }
         }
         let known = self.index_of.get_or_init(|| {
@@ -256,13 +262,25 @@ impl<'p> Wanted<'p> {
     fn column_of(&mut self, name: &str) -> Option<usize> {
         let bare = if self.has_bare { self.index_of(&bare_name(name)) } else { None };
         let index = bare.or_else(|| self.index_of(name))?;
-        let column = &mut self.columns[index];
+        let value = self.observed[index].value.as_ref().ok()?.index();
+        let place = if self.in_all_modes { value } else { index };
+        if self.columns.len() <= place {
+            self.columns.resize(place + 1, NONE);
+        }
+        let origin = self.special.get(name).copied().unwrap_or(Origin::Other);
+        let column = &mut self.columns[place];
         if *column == NONE {
             *column = self.chosen.len() as u32;
             self.chosen.push(index);
-            self.origins.push(self.special.get(name).copied().unwrap_or(Origin::Other));
+            self.origins.push(origin);
+            return Some(*column as usize);
         }
-        Some(*column as usize)
+        // It goes by the name that would be looked at first.
+        let at = *column as usize;
+        if (origin, &self.observed[index].name) < (self.origins[at], &self.observed[self.chosen[at]].name) {
+            (self.origins[at], self.chosen[at]) = (origin, index);
+        }
+        Some(at)
     }
 }
 

@@ -38,6 +38,8 @@ use crate::verdict::{Made, OPEN};
 const SMOOTH: usize = 2000;
 /// Runs that record more variables than this record the ends of their steps only.
 const MOST_INSIDE: usize = 500;
+/// So do runs of models with more variables than this: the audit looks at all of them at each sample.
+const LARGE: usize = 20_000;
 
 /// What to run and how exactly. Times in s, values in SI units; series of inputs and recorded outputs in the units that
 /// their declarations give.
@@ -51,7 +53,7 @@ pub struct Run {
     pub at: Vec<f64>,
     /// Whether methods of variable step record three points inside each step as well, where every step is recorded: what is
     /// greatest and what means are is then known as exactly as the run, and curves are smooth. Gradients have them in all steps,
-    /// other runs in the first 2000, if they record at most 500 variables.
+    /// other runs in the first 2000, if they record at most 500 variables of a model with at most 20,000.
     pub inside: bool,
     /// The formulation.
     pub form: Form,
@@ -401,7 +403,7 @@ impl Model {
         let (start, free) = self.start_with_freedom(system, run.start)?;
         notes.extend(one_of_many(free));
         let mut options = options(run)?;
-        options.inside = inside(run, system.observed());
+        options.inside = inside(run, system.observed(), system.program());
         if options.check(start.len()).is_ok() {
             cost::check(system, &start, &options, system.observed())?;
         }
@@ -440,7 +442,7 @@ impl Model {
         let (y, yp) = system.start_at(0.0, &x).map_err(|failure| self.stopped(failure))?;
         timings.start = begun.elapsed().as_secs_f64();
         let mut options = if explicit { options(run)? } else { implicit_options(run)? };
-        options.inside = inside(run, system.recorded().len());
+        options.inside = inside(run, system.recorded().len(), system.reference().program());
         if options.check(y.len()).is_ok() {
             let recorded = Recording::recorded(&system).len();
             cost::check(system.reference_mut(), &x, &options, recorded)?;
@@ -907,9 +909,9 @@ pub(crate) fn units(system: &impl Recording) -> Vec<Option<Unit>> {
     system.recorded().iter().map(|&i| observed[i].unit.clone().filter(|unit| !unit.is_si())).collect()
 }
 
-/// In how many steps a run that records so many variables has samples inside.
-fn inside(run: &Run, recorded: usize) -> usize {
-    if run.inside && recorded <= MOST_INSIDE { SMOOTH } else { 0 }
+/// In how many steps a run that records so many variables of a program has samples inside.
+fn inside(run: &Run, recorded: usize, program: &Program) -> usize {
+    if run.inside && recorded <= MOST_INSIDE && program.observed.len() <= LARGE { SMOOTH } else { 0 }
 }
 
 pub(crate) fn options(run: &Run) -> Result<Options, Problem> {

@@ -385,7 +385,8 @@ class Model:
         Args:
             to: End of the run in s; it begins at 0.
             every: Time between samples in s; nothing: every step, of methods of variable step with three samples inside (of
-                the first 2000 steps, if up to 500 variables are recorded), between which a run is as exact as at them.
+                the first 2000 steps, if up to 500 variables of at most 20,000 are recorded), between which a run is as
+                exact as at them.
             at: Times of the samples in s, ascending, in the place of these; the end is sampled too.
             method: ``auto``, ``explicit``, ``bdf`` or ``radau`` with steps of variable length; ``euler``, ``heun``, ``rk4``,
                 ``implicit-midpoint``, ``linearly-implicit-euler``, ``linearly-implicit-bdf2`` or ``rosenbrock`` with steps of
