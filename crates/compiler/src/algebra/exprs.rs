@@ -3,13 +3,13 @@
 use super::assumptions::Assumptions;
 use super::calculus::By;
 use super::fingerprint::{Fingerprint, mix};
-use super::grown::Grown;
+use super::grown::{Grown, GrownTexts};
 use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
 use super::rewrite::ShortForms;
 use super::symbol_sets::{SetId, SymbolSets};
-use super::symbols::{SymbolEntry, SymbolKind, Texts};
+use super::symbols::{SymbolEntry, SymbolKind};
 use super::table::{Table1d, TableId};
 use super::zero::Told;
 use hashbrown::HashTable;
@@ -42,7 +42,7 @@ pub struct Exprs {
     pub(super) by_label: HashTable<u32>,
     /// All symbols that are made of others.
     pub(super) made: FxHashMap<SymbolKind, Symbol>,
-    pub(super) texts: Texts,
+    pub(super) texts: GrownTexts,
     pub(super) sets: SymbolSets,
     pub(super) tables: Vec<Table1d>,
     pub(super) derivatives: FxHashMap<(Expr, By), Expr>,
@@ -79,7 +79,7 @@ impl Default for Exprs {
             of_symbols: Vec::new(),
             by_label: HashTable::new(),
             made: FxHashMap::default(),
-            texts: Texts::default(),
+            texts: GrownTexts::default(),
             sets: SymbolSets::default(),
             tables: Vec::new(),
             derivatives: FxHashMap::default(),

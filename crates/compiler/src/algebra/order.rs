@@ -37,7 +37,7 @@ impl Exprs {
         }
         rank(&x.node).cmp(&rank(&y.node)).then_with(|| match (&x.node, &y.node) {
             (Node::Number(p), Node::Number(q)) => p.cmp(q),
-            (Node::Symbol(p), Node::Symbol(q)) => self.name_order(*p).cmp(self.name_order(*q)),
+            (Node::Symbol(p), Node::Symbol(q)) => self.name_order(*p, *q),
             (Node::Call(f, _), Node::Call(g, _)) => f.cmp(g).then_with(|| self.order_children(&x.node, &y.node)),
             (Node::Compare(f, ..), Node::Compare(g, ..)) => {
                 f.cmp(g).then_with(|| self.order_children(&x.node, &y.node))

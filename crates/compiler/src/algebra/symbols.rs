@@ -2,8 +2,9 @@
 
 use super::exprs::Exprs;
 use super::fingerprint::mix;
-use super::grown::{GrownTexts, Place, place};
+use super::grown::{Place, place};
 use super::node::{Expr, Facts, Node, Symbol};
+use std::cmp::Ordering;
 
 /// What a symbol is, seen from the one that it is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -42,32 +43,13 @@ pub enum SymbolKind {
 /// A symbol of the pool.
 #[derive(Clone)]
 pub(super) struct SymbolEntry {
-    /// Where its label, its name and its order stand in the texts of the pool.
+    /// Where its label and its name stand in the texts of the pool.
     label: Place,
     name: Place,
-    order: Place,
     /// From the label.
     pub hash: u64,
     kind: SymbolKind,
     facts: Facts,
-}
-
-/// What symbols are called.
-#[derive(Clone, Default)]
-pub(super) struct Texts {
-    labels: GrownTexts,
-    /// Labels with their numbers padded, so that `q2` comes before `q10`.
-    orders: GrownTexts,
-}
-
-impl Texts {
-    fn push(&mut self, label: &str) -> Place {
-        self.labels.add(label.len(), |out| out.push_str(label))
-    }
-
-    fn push_order(&mut self, label: &str) -> Place {
-        self.orders.add(3 * label.len(), |out| push_natural_order(out, label))
-    }
 }
 
 /// A name with the sign of its time derivatives: `phi` and 1 are `phi'`.
@@ -164,13 +146,13 @@ impl Exprs {
 
     fn add_hashed(&mut self, hash: u64, (label, name): (&str, &str), kind: SymbolKind, facts: Facts) -> Symbol {
         let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
-        let at = self.texts.push(label);
+        let mut push = |text: &str| self.texts.add(text.len(), |out| out.push_str(text));
+        let at = push(label);
         let name = match label.strip_prefix(name) {
             Some(_) => (at.0, at.0 + place(name.len())),
-            None => self.texts.push(name),
+            None => push(name),
         };
-        let order = self.texts.push_order(label);
-        self.symbols.push(SymbolEntry { label: at, name, order, hash, kind, facts });
+        self.symbols.push(SymbolEntry { label: at, name, hash, kind, facts });
         self.of_symbols.push(None);
         let symbols = &self.symbols;
         self.by_label.insert_unique(hash, id, |&id| symbols[id as usize].hash);
@@ -221,12 +203,12 @@ impl Exprs {
 
     /// What people call a symbol. Twins have one name, and what acts on a kept variable may have that of another.
     pub fn name(&self, symbol: Symbol) -> &str {
-        self.texts.labels.at(self.symbols[symbol.0 as usize].name)
+        self.texts.at(self.symbols[symbol.0 as usize].name)
     }
 
     /// The name with marks that tell it apart from all others.
     pub fn label(&self, symbol: Symbol) -> &str {
-        self.texts.labels.at(self.symbols[symbol.0 as usize].label)
+        self.texts.at(self.symbols[symbol.0 as usize].label)
     }
 
     /// What is known of a symbol.
@@ -250,8 +232,9 @@ impl Exprs {
         e
     }
 
-    pub(super) fn name_order(&self, symbol: Symbol) -> &[u8] {
-        self.texts.orders.at(self.symbols[symbol.0 as usize].order).as_bytes()
+    /// The order of the names of two symbols.
+    pub(super) fn name_order(&self, a: Symbol, b: Symbol) -> Ordering {
+        natural_order(self.label(a), self.label(b))
     }
 }
 
@@ -259,18 +242,35 @@ fn hash_label(label: &str) -> u64 {
     label.bytes().fold(0x5b01, |h, b| mix(h, u64::from(b)))
 }
 
-fn push_natural_order(order: &mut String, name: &str) {
-    let mut rest = name;
-    while !rest.is_empty() {
-        let words = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
-        order.push_str(&rest[..words]);
-        rest = &rest[words..];
-        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
-        if digits > 0 {
-            // The length of a number in front of it sorts shorter numbers first; `0` keeps it among the digits.
-            order.extend(['0', char::from(digits.min(127) as u8)]);
-            order.push_str(&rest[..digits]);
-            rest = &rest[digits..];
-        }
+/// Labels in alphabetical order, numbers in them by their size: `q2` before `q10`.
+fn natural_order(a: &str, b: &str) -> Ordering {
+    let (a, b) = (a.as_bytes(), b.as_bytes());
+    let same = a.iter().zip(b).take_while(|(x, y)| x == y).count();
+    // A number counts whole.
+    let start = a[..same].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |last| last + 1);
+    with_lengths(&a[start..]).cmp(with_lengths(&b[start..]))
+}
+
+/// The bytes with the length of a number in front of it, which sorts shorter numbers first; `0` keeps it among the digits.
+fn with_lengths(label: &[u8]) -> impl Iterator<Item = u8> + '_ {
+    label.chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit()).flat_map(|run| {
+        let length = run[0].is_ascii_digit().then(|| [b'0', run.len().min(127) as u8]);
+        length.into_iter().flatten().chain(run.iter().copied())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::natural_order;
+
+    #[test]
+    fn numbers_in_names_sort_by_their_size() {
+        let names = ["", "a", "a01", "a10", "a.2", "b2", "b2.e", "b2x", "b10", "b10.e", "b10.f", "b10x2", "b10x10"];
+        let mut sorted = names;
+        sorted.sort_by(|a, b| natural_order(a, b));
+        assert_eq!(
+            sorted,
+            ["", "a", "a.2", "a01", "a10", "b2", "b2.e", "b2x", "b10", "b10.e", "b10.f", "b10x2", "b10x10"]
+        );
     }
 }

@@ -389,6 +389,13 @@ impl<'a> Lowering<'a> {
         self.iterated || self.free.steep.iter().any(|&e| self.passes_freely(e))
     }
 
+    /// All values and conditions; what else is known of expressions takes no memory from then on.
+    pub fn into_values(self) -> (Values, Table<ConditionId, (Value, ConditionKind)>) {
+        let Lowering { mut values, conditions, .. } = self;
+        values.settle();
+        (values, conditions)
+    }
+
     fn call(&mut self, f: Function, a: Value, b: Option<Value>) -> Value {
         match (f, b) {
             (Function::Mod, Some(b)) => {

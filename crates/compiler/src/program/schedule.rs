@@ -330,9 +330,9 @@ impl Schedule<'_> {
         let position_relations = position_relations(lower, equations);
         let tables: Vec<_> = (0..graph.exprs.table_count()).map(|i| graph.exprs.table1d(Id::new(i)).clone()).collect();
 
-        let steep = self.lower.is_steep();
-        self.lower.values.settle();
-        let Schedule { lower: Lowering { values, conditions: found, .. }, blocks, pivot_guards, nonsmooth, .. } = self;
+        let Schedule { lower, blocks, pivot_guards, nonsmooth, .. } = self;
+        let steep = lower.is_steep();
+        let (values, found) = lower.into_values();
         let flow = Dataflow { values: &values, blocks: &blocks, parameters: &parameters };
         let rates: Vec<Value> = states.iter().map(|s| s.rate).collect();
         let residuals = conditions.iter().chain(&guesses).map(|vanishing| vanishing.residual);
