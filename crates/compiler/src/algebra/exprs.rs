@@ -117,7 +117,10 @@ impl Exprs {
     /// Makes room for so many more symbols, and expressions of them.
     pub fn reserve(&mut self, symbols: usize) {
         let (entries, known) = (&self.entries, &self.symbols);
-        self.ids.reserve(symbols + symbols / 2, |&id| entries[id as usize].hash);
+        self.ids.reserve(symbols + symbols / 2, |&id| {
+            let entry = &entries[id as usize];
+            spot(entry.hash, &entry.node)
+        });
         self.by_label.reserve(symbols, |&id| known[id as usize].hash);
         self.of_symbols.reserve(symbols);
     }
@@ -196,8 +199,9 @@ impl Exprs {
     /// The entry of a node that is in canonical form.
     pub(super) fn intern(&mut self, node: Node) -> Expr {
         let Whole { hash, depth, size } = self.whole_of(&node);
+        let spot = spot(hash, &node);
         let entries = &self.entries;
-        if let Some(&id) = self.ids.find(hash, |&id| entries[id as usize].node == node) {
+        if let Some(&id) = self.ids.find(spot, |&id| entries[id as usize].node == node) {
             return Expr(id);
         }
         let monomial = self.monomial_of(&node);
@@ -216,7 +220,10 @@ impl Exprs {
         self.entries.push(entry);
         self.assumptions.cover(self.entries.len());
         let entries = &self.entries;
-        self.ids.insert_unique(hash, id, |&id| entries[id as usize].hash);
+        self.ids.insert_unique(spot, id, |&id| {
+            let entry = &entries[id as usize];
+            self::spot(entry.hash, &entry.node)
+        });
         Expr(id)
     }
 
@@ -260,6 +267,28 @@ impl Exprs {
             _ => whole,
         }
     }
+}
+
+/// Where an entry is looked for: near those that are made of parts of about the same time.
+fn spot(hash: u64, node: &Node) -> u64 {
+    match node {
+        Node::Number(_) | Node::Pi => hash,
+        Node::Symbol(symbol) => near(hash, symbol.0),
+        _ => {
+            let mut latest = 0;
+            node.for_each_child(|c| latest = latest.max(c.0));
+            near(hash, latest)
+        }
+    }
+}
+
+/// A hash that leads to places of a table near those of others with a number like this one: large models are gone through cell
+/// by cell, and memory far away takes longer than all else.
+pub(super) fn near(hash: u64, number: u32) -> u64 {
+    const ALIKE: u32 = 6;
+    const WINDOW: u64 = 127;
+    let block = mix(0x10ca1, u64::from(number >> ALIKE));
+    hash & !0xFFFF_FFFF | (block & !WINDOW | hash & WINDOW) & 0xFFFF_FFFF
 }
 
 /// What is known of an entry from its parts.

@@ -164,7 +164,8 @@ impl Builder<'_> {
     fn elements(&mut self) {
         for (at, data) in self.example["elements"].as_array().expect("elements").iter().enumerate() {
             let id = ElementId::new(at);
-            let ports = self.ports(id);
+            let is_two_port = matches!(data["type"].as_str(), Some("TF" | "MTF" | "GY"));
+            let ports = self.ports(id, is_two_port);
             let kind = self.kind(data, id, &ports);
             let name = data["name"].as_str().expect("a name").to_owned();
             let label = data["parameter"].as_str().unwrap_or_default().to_owned();
@@ -182,7 +183,7 @@ impl Builder<'_> {
         }
     }
 
-    fn ports(&self, id: ElementId) -> Vec<Port> {
+    fn ports(&self, id: ElementId, is_two_port: bool) -> Vec<Port> {
         let mut ports = Vec::new();
         for (bond, data) in self.graph.bonds.iter() {
             for (end, inward) in [(data.from, false), (data.to, true)] {
@@ -192,7 +193,10 @@ impl Builder<'_> {
             }
         }
         ports.sort_by_key(|(port, _)| *port);
-        ports.into_iter().map(|(_, port)| port).collect()
+        let names = if is_two_port { ["in", "out"] } else { [""; 2] };
+        let named =
+            |(at, (_, port)): (usize, (u32, Port))| Port { name: names.get(at).unwrap_or(&"").to_string(), ..port };
+        ports.into_iter().enumerate().map(named).collect()
     }
 
     fn kind(&mut self, data: &Value, id: ElementId, ports: &[Port]) -> Kind {
