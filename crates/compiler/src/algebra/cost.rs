@@ -34,11 +34,13 @@ impl Exprs {
     /// into each other grow without bound, though they are printed and computed with the digits of one.
     pub fn is_longer(&self, e: Expr, length: u64) -> bool {
         let is_long = |part: Expr| self.is_number(part).is_some_and(|n| n.bits() > LONG_NUMBER);
-        if self.entry(e).size == 1 {
-            return is_long(e) || self.written_length(e) > length;
-        }
-        let may_be = LONGEST * u64::from(self.entry(e).size) > length;
-        may_be && self.written_length(e) > length || self.around_wholes(&[e], &|_| true).into_iter().any(is_long)
+        let size = self.entry(e).size;
+        let may_be = LONGEST * u64::from(size) > length;
+        let holds_a_long_number = || match size {
+            1 => is_long(e),
+            _ => self.around_wholes(&[e], &|_| true).into_iter().any(is_long),
+        };
+        may_be && self.written_length(e) > length || holds_a_long_number()
     }
 
     /// What it costs to evaluate the expressions once. Integer powers are multiplications by squaring; a factor of -1

@@ -85,8 +85,8 @@ pub struct EvaluationOrder<'a> {
 const LANES: usize = 8;
 /// Values that differ by more than this part of them are different,
 const CLEARLY: f64 = 1e-6;
-/// and differences below this part of what the values are sums of are rounding.
-const ROUNDING: f64 = 1e-10;
+/// and differences below so many times the error that rounding mostly leaves in them are none.
+const ROUNDING: f64 = 1e4;
 
 /// A value between 1 and 2, as good as random: that of a symbol at the point of this number.
 pub fn somewhere(number: u64, symbol: Symbol) -> f64 {
@@ -165,7 +165,7 @@ impl<'a> EvaluationOrder<'a> {
         let anywhere: Vec<f64> = self.symbols.iter().map(|&symbol| somewhere(0, symbol)).collect();
         self.values_in(&mut room, |k| [anywhere[k]]);
         let here: Vec<f64> = self.wanted.iter().map(|&at| room[at][0]).collect();
-        let sizes = self.sizes(&room);
+        let errors = self.errors(&room);
         let symbols: Vec<usize> = (0..self.symbols.len()).filter(|&k| may_go(self.symbols[k])).collect();
         let mut found = Vec::with_capacity(symbols.len());
         let mut lanes = Vec::new();
@@ -191,8 +191,8 @@ impl<'a> EvaluationOrder<'a> {
             for (lane, &k) in together.iter().enumerate() {
                 let is_near = |e: usize| {
                     let (one, other) = (here[e], there[e][lane]);
-                    let most = (one.abs() + other.abs()).max(ROUNDING / CLEARLY * sizes[self.wanted[e]]);
-                    let apart = (one - other).abs() > CLEARLY * most;
+                    let apart =
+                        (one - other).abs() > CLEARLY * (one.abs() + other.abs()) + ROUNDING * errors[self.wanted[e]];
                     reads[self.wanted[e]] >> lane & 1 == 1 && !apart
                 };
                 found.push((self.symbols[k], (0..self.wanted.len()).filter(|&e| is_near(e)).collect()));
@@ -201,26 +201,42 @@ impl<'a> EvaluationOrder<'a> {
         found
     }
 
-    /// What values are sums of, in magnitude: what is small beside that is rounding.
-    fn sizes(&self, room: &[[f64; 1]]) -> Vec<f64> {
-        let mut sizes: Vec<f64> = Vec::with_capacity(self.order.len());
+    /// The error that rounding mostly leaves in each value, as the root of a sum of squares: errors of different roundings hardly
+    /// ever add up, and of bounds that let them nothing would be left after some dozen rotations.
+    fn errors(&self, room: &[[f64; 1]]) -> Vec<f64> {
+        let mut squares: Vec<f64> = Vec::with_capacity(self.order.len());
         for (at, evaluated) in self.order.iter().enumerate() {
-            let own = room[at][0].abs();
-            let size = match *evaluated {
-                Evaluated::Number(_) | Evaluated::Symbol(_) => own,
+            let square = match *evaluated {
+                Evaluated::Number(number) => (f64::EPSILON * number).powi(2),
+                Evaluated::Symbol(_) => 0.0,
                 Evaluated::Node(node, first) => {
-                    let part = |k: usize| sizes[self.parts[first + k] as usize];
+                    let value = |k: usize| room[self.parts[first + k] as usize][0];
+                    let error = |k: usize| squares[self.parts[first + k] as usize];
+                    let own = (f64::EPSILON * room[at][0]).powi(2);
                     match node {
-                        Node::Add(terms) => (0..terms.len()).map(part).sum(),
-                        Node::Mul(factors) => (0..factors.len()).map(part).product(),
-                        Node::Whole(_) => part(0),
-                        _ => own,
+                        Node::Add(terms) => {
+                            (0..terms.len()).map(|k| error(k) + (f64::EPSILON * value(k)).powi(2)).sum()
+                        }
+                        Node::Mul(factors) => {
+                            let others = |k: usize| (0..factors.len()).filter(move |&other| other != k).map(value);
+                            own + (0..factors.len()).map(|k| error(k) * others(k).product::<f64>().powi(2)).sum::<f64>()
+                        }
+                        Node::Whole(_) => error(0),
+                        _ => {
+                            let mut parts = 0..;
+                            let mut sum = own;
+                            node.for_each_child(|_| {
+                                let k = parts.next().unwrap_or_default();
+                                sum += error(k) * (room[at][0] / value(k)).powi(2).max(1.0);
+                            });
+                            sum
+                        }
                     }
                 }
             };
-            sizes.push(size);
+            squares.push(square);
         }
-        sizes
+        squares.into_iter().map(f64::sqrt).collect()
     }
 
     /// The slopes of the sum of all expressions, each times a weight, by each of the symbols, at the point whose values
