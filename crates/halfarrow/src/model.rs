@@ -183,6 +183,11 @@ impl Model {
         self.watch.time("program", || schedule(equations))
     }
 
+    /// How many expressions its bond graph is made of: what it takes to read it, as a count.
+    pub fn expressions(&self) -> usize {
+        self.graph.exprs.len()
+    }
+
     /// What the stages took so far that this model, or a copy of it, went through.
     pub fn timings(&self) -> Vec<StageTime> {
         self.watch.noted()

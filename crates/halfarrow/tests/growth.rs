@@ -85,9 +85,19 @@ const HINGES_GROW: f64 = 1.08;
 /// And of those with loops.
 const RODS_GROW: f64 = 1.1;
 
-fn operations(text: &str) -> usize {
+/// Operations of one evaluation, and expressions of the bond graph.
+fn work(text: &str) -> (usize, usize) {
     let model = Model::from_text("growing.bond", text, &[]).expect("a model");
-    model.compile(Form::Minimal).expect("equations").operations()
+    (model.compile(Form::Minimal).expect("equations").operations(), model.expressions())
+}
+
+/// Adds what is counted of a family at three sizes to the table; the operations.
+fn note(table: &mut String, name: &str, sizes: [usize; 3], text: impl Fn(usize) -> String) -> [usize; 3] {
+    sizes.map(|size| {
+        let (operations, expressions) = work(&text(size));
+        _ = writeln!(table, "{name} {size}: {operations} operations, {expressions} expressions");
+        operations
+    })
 }
 
 /// The power with which the last of these counts grow with the cells.
@@ -100,10 +110,7 @@ fn exponent([_, middle, large]: [usize; 3], [_, fewer, more]: [usize; 3]) -> f64
 fn work_grows_with_the_cells() {
     let mut table = String::new();
     for Growing { family, sizes, cells, most } in FAMILIES {
-        let counted = sizes.map(|size| operations(&family.model("Growing", size)));
-        for (size, count) in sizes.iter().zip(counted) {
-            _ = writeln!(table, "{} {size}: {count}", family.name());
-        }
+        let counted = note(&mut table, family.name(), sizes, |size| family.model("Growing", size));
         let exponent = exponent(counted, sizes.map(cells));
         assert!(exponent <= most, "{} grows as the power {exponent:.3} of its cells", family.name());
     }
@@ -115,10 +122,7 @@ fn work_grows_with_the_cells() {
         ("loops", &loops, [10, 40, 80], RODS_GROW),
         ("ropes", ROPES, [10, 100, 1000], ROPES_GROW),
     ] {
-        let counted = sizes.map(|size| operations(&text.replace("SIZE", &size.to_string())));
-        for (size, count) in sizes.iter().zip(counted) {
-            _ = writeln!(table, "{name} {size}: {count}");
-        }
+        let counted = note(&mut table, name, sizes, |size| text.replace("SIZE", &size.to_string()));
         let exponent = exponent(counted, sizes);
         assert!(exponent <= most, "{name} grows as the power {exponent:.3} of its cells");
     }

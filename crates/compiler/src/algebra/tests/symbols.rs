@@ -45,3 +45,28 @@ fn a_name_that_is_taken_gets_a_number() {
     assert_eq!(x.name(momentum), "m.pi_2");
     assert_eq!(x.made_of(SymbolKind::Momentum(speed), "m.pi"), momentum);
 }
+
+/// A vector turned two hundred times depends on each angle, its length on none: what the length leaves of it is rounding.
+#[test]
+fn rounding_of_a_long_chain_is_told_from_what_it_depends_on() {
+    let mut x = Exprs::default();
+    let angles: Vec<Symbol> = (0..200).map(|i| x.symbol(&format!("q{i}"), Facts::default())).collect();
+    let (mut along, mut across) = (x.int(3), x.int(4));
+    for &angle in &angles {
+        let angle = x.sym(angle);
+        let [sine, cosine] = [Function::Sin, Function::Cos].map(|f| x.call(f, &[angle]));
+        let minus = x.neg(sine);
+        let mut turned = |a: Expr, b: Expr| {
+            let terms = [x.mul(&[a, along]), x.mul(&[b, across])];
+            let sum = x.add(&terms);
+            x.whole(sum)
+        };
+        (along, across) = (turned(cosine, minus), turned(sine, cosine));
+    }
+    let squares = [along, across].map(|e| x.powi(e, 2));
+    let minus = x.int(-25);
+    let zero = x.add(&[squares[0], squares[1], minus]);
+    let moved = EvaluationOrder::new(&x, &[along, zero]).hardly_moved(&|_| true);
+    assert_eq!(moved.len(), angles.len());
+    moved.into_iter().for_each(|(symbol, members)| assert_eq!(members, [1], "{symbol:?}"));
+}
