@@ -2,9 +2,9 @@
 
 use super::assumptions::Assumptions;
 use super::calculus::By;
-use super::fingerprint::{Fingerprint, mix};
+use super::fingerprint::{Fingerprint, mix, near};
 use super::grown::{Grown, GrownTexts};
-use super::node::{Comparison, Expr, Function, Node, Symbol};
+use super::node::{Comparison, Expr, Function, Node, Parts, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
 use super::rewrite::ShortForms;
@@ -273,22 +273,13 @@ impl Exprs {
 fn spot(hash: u64, node: &Node) -> u64 {
     match node {
         Node::Number(_) | Node::Pi => hash,
-        Node::Symbol(symbol) => near(hash, symbol.0),
+        Node::Symbol(symbol) => near(hash, [symbol.0]),
         _ => {
-            let mut latest = 0;
-            node.for_each_child(|c| latest = latest.max(c.0));
-            near(hash, latest)
+            let mut parts = Parts::new();
+            node.for_each_child(|c| parts.push(c));
+            near(hash, parts.into_iter().map(|c| c.0))
         }
     }
-}
-
-/// A hash that leads to places of a table near those of others with a number like this one: large models are gone through cell
-/// by cell, and memory far away takes longer than all else.
-pub(super) fn near(hash: u64, number: u32) -> u64 {
-    const ALIKE: u32 = 6;
-    const WINDOW: u64 = 127;
-    let block = mix(0x10ca1, u64::from(number >> ALIKE));
-    hash & !0xFFFF_FFFF | (block & !WINDOW | hash & WINDOW) & 0xFFFF_FFFF
 }
 
 /// What is known of an entry from its parts.

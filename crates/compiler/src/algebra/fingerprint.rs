@@ -33,6 +33,16 @@ pub fn mix(a: u64, b: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// A hash that leads to places of a table near those of others that are made of parts with numbers like these: large models are
+/// gone through cell by cell, and memory far away takes longer than all else. What has a part in common with many others is
+/// near those alone whose other parts are near its own.
+pub fn near(hash: u64, parts: impl IntoIterator<Item = u32>) -> u64 {
+    const ALIKE: u32 = 6;
+    const WINDOW: u64 = 127;
+    let block = parts.into_iter().fold(0x10ca1, |block, part| mix(block, u64::from(part >> ALIKE)));
+    hash & !0xFFFF_FFFF | (block & !WINDOW | hash & WINDOW) & 0xFFFF_FFFF
+}
+
 /// A number between 1 and 2, as good as random and the same for the same two values.
 pub fn scattered(a: u64, b: u64) -> f64 {
     f64::from_bits(1.0f64.to_bits() | (mix(a, b) >> 12))

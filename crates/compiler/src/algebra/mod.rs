@@ -45,7 +45,7 @@ pub use elimination::{
 pub use estimate::{Estimate, Estimates};
 pub use evaluate::{EvaluationOrder, Evaluator, somewhere};
 pub use exprs::{Exprs, MINUS_ONE, ONE, ZERO};
-pub(crate) use fingerprint::{mix, scattered};
+pub(crate) use fingerprint::{mix, near, scattered};
 pub use lowest_terms::LowestTerms;
 pub use node::{Comparison, Expr, Facts, Function, Node, Parts, Symbol};
 pub use rational::Rational;

@@ -3,9 +3,11 @@
 use super::Value;
 use super::op::{Bits, Op};
 use super::samples::{Recognised, Samples};
+use crate::algebra::near;
 use crate::ids::Table;
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
+use smallvec::SmallVec;
 use std::hash::BuildHasher;
 
 /// On what a value depends, as a set.
@@ -46,6 +48,13 @@ pub struct Values {
     samples: Option<Box<Samples>>,
 }
 
+/// Where an operation is looked for: near others of operands of about the same time.
+fn spot(op: Op) -> u64 {
+    let (hash, mut operands) = (FxBuildHasher.hash_one(op), SmallVec::<[u32; 4]>::new());
+    op.for_each_operand(|value| operands.push(value.0));
+    if operands.is_empty() { hash } else { near(hash, operands) }
+}
+
 impl Values {
     /// The value of an operation; equal operations are one value, and so are operations that are found to be equal. For a
     /// solution, `reads` is what its block reads.
@@ -77,14 +86,13 @@ impl Values {
     }
 
     fn push(&mut self, op: Op, reads: Reads) -> Value {
-        let hash = |op: &Op| FxBuildHasher.hash_one(op);
         self.reads.push(reads);
         if let Some(samples) = &mut self.samples {
             samples.add(op);
         }
         let value = self.ops.push(op);
         let Values { ops, known, .. } = self;
-        known.insert_unique(hash(&op), value, |&value| hash(&ops[value]));
+        known.insert_unique(spot(op), value, |&value| spot(ops[value]));
         value
     }
 
@@ -101,7 +109,7 @@ impl Values {
 
     /// The value of an operation, if there is one.
     pub fn find(&self, op: Op) -> Option<Value> {
-        self.known.find(FxBuildHasher.hash_one(op), |&value| self.ops[value] == op).copied()
+        self.known.find(spot(op), |&value| self.ops[value] == op).copied()
     }
     /// The operation of a value.
     pub fn op(&self, value: Value) -> Op {
