@@ -192,8 +192,7 @@ fn links_of(
             match law {
                 Law::Line { right, of, .. } => {
                     links.push(Link { of, from: Quantity::Number, weight: right.magnitude(middle), straight: false });
-                    let slopes = right.slopes().map(|(symbol, slope)| (scales.of(graph, symbol), slope));
-                    let slopes = slopes.filter(|(from, _)| settled.of(*from) > 0.0);
+                    let slopes = slopes_of(&right, graph, (scales, settled));
                     let tells = tells(settled, slopes.clone());
                     links.extend(slopes.map(|(from, weight)| Link { of, from, weight, straight: tells(from, weight) }));
                 }
@@ -254,6 +253,16 @@ fn links_of(
         }
     }
     links
+}
+
+/// What a sum of numbers times variables makes of each quantity that there is something of.
+fn slopes_of<'l>(
+    line: &'l Line,
+    graph: &'l BondGraph,
+    (scales, settled): (&'l Scales, &'l Settled),
+) -> impl Iterator<Item = (Quantity, f64)> + Clone + 'l {
+    let slopes = line.slopes().map(|(symbol, slope)| (scales.of(graph, symbol), slope));
+    slopes.filter(|(from, _)| settled.of(*from) > 0.0)
 }
 
 /// Which terms of a sum tell how great their variables are: those that are not lost in the others, such as what an
@@ -606,8 +615,7 @@ impl<'a, 'b> Check<'a, 'b> {
         for (k, &time) in self.values.times.iter().enumerate() {
             let miss = left[k] - right.at(k);
             self.worst.note_of(self.laws, miss, scale, settled, || {
-                let slopes = right.slopes().map(|(symbol, slope)| (scales.of(graph, symbol), slope));
-                let slopes = slopes.filter(|(from, _)| settled.of(*from) > 0.0);
+                let slopes = slopes_of(right, graph, (scales, settled));
                 let terms = [natural, Term::beside(Quantity::Number, right.magnitude(k))].into_iter();
                 let terms = terms.chain(slopes.map(|(from, slope)| Term::beside(from, slope))).collect();
                 raw(miss, time, name, what, terms)

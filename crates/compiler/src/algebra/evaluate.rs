@@ -204,22 +204,21 @@ impl<'a> EvaluationOrder<'a> {
     /// The error that rounding mostly leaves in each value, as the root of a sum of squares: errors of different roundings hardly
     /// ever add up, and of bounds that let them nothing would be left after some dozen rotations.
     fn errors(&self, room: &[[f64; 1]]) -> Vec<f64> {
+        let square = |value: f64| value * value;
         let mut squares: Vec<f64> = Vec::with_capacity(self.order.len());
         for (at, evaluated) in self.order.iter().enumerate() {
-            let square = match *evaluated {
-                Evaluated::Number(number) => (f64::EPSILON * number).powi(2),
+            let error = match *evaluated {
+                Evaluated::Number(number) => square(f64::EPSILON * number),
                 Evaluated::Symbol(_) => 0.0,
                 Evaluated::Node(node, first) => {
                     let value = |k: usize| room[self.parts[first + k] as usize][0];
                     let error = |k: usize| squares[self.parts[first + k] as usize];
-                    let own = (f64::EPSILON * room[at][0]).powi(2);
+                    let own = square(f64::EPSILON * room[at][0]);
                     match node {
-                        Node::Add(terms) => {
-                            (0..terms.len()).map(|k| error(k) + (f64::EPSILON * value(k)).powi(2)).sum()
-                        }
+                        Node::Add(terms) => (0..terms.len()).map(|k| error(k) + square(f64::EPSILON * value(k))).sum(),
                         Node::Mul(factors) => {
                             let others = |k: usize| (0..factors.len()).filter(move |&other| other != k).map(value);
-                            own + (0..factors.len()).map(|k| error(k) * others(k).product::<f64>().powi(2)).sum::<f64>()
+                            own + (0..factors.len()).map(|k| error(k) * square(others(k).product())).sum::<f64>()
                         }
                         Node::Whole(_) => error(0),
                         _ => {
@@ -227,14 +226,15 @@ impl<'a> EvaluationOrder<'a> {
                             let mut sum = own;
                             node.for_each_child(|_| {
                                 let k = parts.next().unwrap_or_default();
-                                sum += error(k) * (room[at][0] / value(k)).powi(2).max(1.0);
+                                let steep = square(room[at][0] / value(k));
+                                sum += error(k) * if steep.is_finite() { steep.max(1.0) } else { 1.0 };
                             });
                             sum
                         }
                     }
                 }
             };
-            squares.push(square);
+            squares.push(error);
         }
         squares.into_iter().map(f64::sqrt).collect()
     }
