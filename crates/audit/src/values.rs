@@ -459,7 +459,12 @@ impl LineTerm<'_> {
     }
 
     fn at(&self, sample: usize) -> f64 {
-        self.moved.map_or(self.before, |(_, column)| self.times(column[sample]))
+        self.with(|column| column[sample])
+    }
+
+    /// Its value where the variable has this one of its column.
+    fn with(&self, of: impl Fn(&[f64]) -> f64) -> f64 {
+        self.moved.map_or(self.before, |(_, column)| self.times(of(column)))
     }
 }
 
@@ -471,7 +476,7 @@ impl Line<'_> {
 
     /// Its value where all variables in it have this one.
     pub fn where_all_are(&self, value: f64) -> f64 {
-        self.terms.iter().fold(-0.0, |sum, term| sum + term.moved.map_or(term.before, |_| term.times(value)))
+        self.terms.iter().fold(-0.0, |sum, term| sum + term.with(|_| value))
     }
 
     /// The sum of the magnitudes of its terms at a sample.

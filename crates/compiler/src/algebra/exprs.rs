@@ -4,7 +4,7 @@ use super::assumptions::Assumptions;
 use super::calculus::By;
 use super::fingerprint::{Fingerprint, mix, near};
 use super::grown::{Grown, GrownTexts};
-use super::node::{Comparison, Expr, Function, Node, Parts, Symbol};
+use super::node::{Comparison, Expr, Function, Node, Symbol};
 use super::properties::Properties;
 use super::rational::Rational;
 use super::rewrite::ShortForms;
@@ -70,6 +70,12 @@ pub(super) struct PoolEntry {
     pub fingerprint: Fingerprint,
 }
 
+impl PoolEntry {
+    fn spot(&self) -> u64 {
+        spot(self.hash, &self.node)
+    }
+}
+
 impl Default for Exprs {
     fn default() -> Self {
         let mut pool = Exprs {
@@ -117,10 +123,7 @@ impl Exprs {
     /// Makes room for so many more symbols, and expressions of them.
     pub fn reserve(&mut self, symbols: usize) {
         let (entries, known) = (&self.entries, &self.symbols);
-        self.ids.reserve(symbols + symbols / 2, |&id| {
-            let entry = &entries[id as usize];
-            spot(entry.hash, &entry.node)
-        });
+        self.ids.reserve(symbols + symbols / 2, |&id| entries[id as usize].spot());
         self.by_label.reserve(symbols, |&id| known[id as usize].hash);
         self.of_symbols.reserve(symbols);
     }
@@ -220,10 +223,7 @@ impl Exprs {
         self.entries.push(entry);
         self.assumptions.cover(self.entries.len());
         let entries = &self.entries;
-        self.ids.insert_unique(spot, id, |&id| {
-            let entry = &entries[id as usize];
-            self::spot(entry.hash, &entry.node)
-        });
+        self.ids.insert_unique(spot, id, |&id| entries[id as usize].spot());
         Expr(id)
     }
 
@@ -271,15 +271,10 @@ impl Exprs {
 
 /// Where an entry is looked for: near those that are made of parts of about the same time.
 fn spot(hash: u64, node: &Node) -> u64 {
-    match node {
-        Node::Number(_) | Node::Pi => hash,
-        Node::Symbol(symbol) => near(hash, [symbol.0]),
-        _ => {
-            let mut parts = Parts::new();
-            node.for_each_child(|c| parts.push(c));
-            near(hash, parts.into_iter().map(|c| c.0))
-        }
-    }
+    near(hash, |part| match node {
+        Node::Symbol(symbol) => part(symbol.0),
+        _ => node.for_each_child(|c| part(c.0)),
+    })
 }
 
 /// What is known of an entry from its parts.

@@ -35,12 +35,13 @@ pub fn mix(a: u64, b: u64) -> u64 {
 
 /// A hash that leads to places of a table near those of others that are made of parts with numbers like these: large models are
 /// gone through cell by cell, and memory far away takes longer than all else. What has a part in common with many others is
-/// near those alone whose other parts are near its own.
-pub fn near(hash: u64, parts: impl IntoIterator<Item = u32>) -> u64 {
+/// near those alone whose other parts are near its own. `parts` visits them; what has none is anywhere.
+pub fn near(hash: u64, parts: impl FnOnce(&mut dyn FnMut(u32))) -> u64 {
     const ALIKE: u32 = 6;
     const WINDOW: u64 = 127;
-    let block = parts.into_iter().fold(0x10ca1, |block, part| mix(block, u64::from(part >> ALIKE)));
-    hash & !0xFFFF_FFFF | (block & !WINDOW | hash & WINDOW) & 0xFFFF_FFFF
+    let mut block = None;
+    parts(&mut |part| block = Some(mix(block.unwrap_or(0x10ca1), u64::from(part >> ALIKE))));
+    block.map_or(hash, |block| hash & !0xFFFF_FFFF | (block & !WINDOW | hash & WINDOW) & 0xFFFF_FFFF)
 }
 
 /// A number between 1 and 2, as good as random and the same for the same two values.

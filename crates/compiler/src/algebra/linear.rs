@@ -58,14 +58,10 @@ impl Exprs {
     /// Solves `left = right` for a symbol that is a factor of the right side and stands nowhere else, as in the law of a linear
     /// resistor. `None` for anything else.
     pub fn solve_product(&mut self, left: Expr, right: Expr, symbol: Symbol) -> Option<Expr> {
-        let Node::Mul(factors) = self.node(right) else { return None };
-        let is_own = |f: &Expr| *self.node(*f) == Node::Symbol(symbol);
-        let (own, others): (Parts, Parts) = factors.iter().copied().partition(is_own);
-        let reads_it = |x: &Exprs, e: Expr| x.depends_on(e, symbol);
-        if own.len() != 1 || reads_it(self, left) || others.iter().any(|&f| reads_it(self, f)) {
+        if self.depends_on(left, symbol) || !matches!(self.node(right), Node::Mul(_)) {
             return None;
         }
-        let coefficient = self.mul(&others);
+        let coefficient = self.coefficient_of(right, symbol)?;
         self.divide(left, coefficient)
     }
 
@@ -94,19 +90,23 @@ impl Exprs {
         if rest.iter().any(|&t| self.depends_on(t, symbol)) {
             return None;
         }
-        let is_own = |f: &Expr| *self.node(*f) == Node::Symbol(symbol);
-        let coefficient = match self.node(term) {
-            Node::Symbol(_) => ONE,
-            Node::Mul(factors) => {
-                let (own, others): (Parts, Parts) = factors.iter().copied().partition(is_own);
-                if own.len() != 1 || others.iter().any(|&f| self.depends_on(f, symbol)) {
-                    return None;
-                }
-                self.mul(&others)
-            }
-            _ => return None,
-        };
+        let coefficient = self.coefficient_of(term, symbol)?;
         Some((coefficient, self.add(&rest)))
+    }
+
+    /// What a symbol is multiplied by in a term that reads it: the symbol, or a product with it as one factor; `None` for anything
+    /// else.
+    fn coefficient_of(&mut self, term: Expr, symbol: Symbol) -> Option<Expr> {
+        match self.node(term) {
+            Node::Symbol(_) => Some(ONE),
+            Node::Mul(factors) => {
+                let is_own = |f: &Expr| *self.node(*f) == Node::Symbol(symbol);
+                let (own, others): (Parts, Parts) = factors.iter().copied().partition(is_own);
+                let alone = own.len() == 1 && !others.iter().any(|&f| self.depends_on(f, symbol));
+                alone.then(|| self.mul(&others))
+            }
+            _ => None,
+        }
     }
 
     /// The expression as a quotient: what stands over and under its line, where only factors that may vanish stand under it.

@@ -7,7 +7,6 @@ use crate::algebra::near;
 use crate::ids::Table;
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
-use smallvec::SmallVec;
 use std::hash::BuildHasher;
 
 /// On what a value depends, as a set.
@@ -50,9 +49,7 @@ pub struct Values {
 
 /// Where an operation is looked for: near others of operands of about the same time.
 fn spot(op: Op) -> u64 {
-    let (hash, mut operands) = (FxBuildHasher.hash_one(op), SmallVec::<[u32; 4]>::new());
-    op.for_each_operand(|value| operands.push(value.0));
-    if operands.is_empty() { hash } else { near(hash, operands) }
+    near(FxBuildHasher.hash_one(op), |part| op.for_each_operand(|value| part(value.0)))
 }
 
 impl Values {
