@@ -310,9 +310,10 @@ impl<'a> Builder<'a, '_> {
     }
 
     fn choice(&mut self, cx: &Reading<'_>, i: &'a ast::If, span: Span) -> Option<Value> {
-        let condition = self.truth(cx, &i.cond);
+        let counted = self.counted_truth(cx, &i.cond);
+        let condition = if counted.is_some() { None } else { self.truth(cx, &i.cond).map(|value| value.expr) };
         let (yes, no) = (self.read(cx, &i.yes), self.read(cx, &i.no));
-        let (condition, yes, no) = (condition?, yes?, no?);
+        let (yes, no) = (yes?, no?);
         if yes.truth != no.truth {
             self.fault(Diagnostic::error(
                 codes::N017,
@@ -323,8 +324,52 @@ impl<'a> Builder<'a, '_> {
             return None;
         }
         self.equal(&yes.quantity, &no.quantity, span, "the two branches");
-        let expr = self.exprs.select(condition.expr, yes.expr, no.expr);
+        let expr = match counted {
+            Some(true) => yes.expr,
+            Some(false) => no.expr,
+            None => self.exprs.select(condition?, yes.expr, no.expr),
+        };
         Some(Value { expr, quantity: known_of(&yes.quantity, &no.quantity), truth: yes.truth })
+    }
+
+    /// A comparison of variables of repetitions, with whole numbers added to them, as `i == 1`: it is no expression, so that
+    /// turns in which it is alike have the same.
+    fn counted_truth(&self, cx: &Reading<'_>, e: &ast::Expr) -> Option<bool> {
+        match &e.kind {
+            ExprKind::Unary(u) if u.op == UnaryOp::Not => Some(!self.counted_truth(cx, &u.operand)?),
+            ExprKind::Binary(b) => match b.op {
+                BinaryOp::And => Some(self.counted_truth(cx, &b.left)? & self.counted_truth(cx, &b.right)?),
+                BinaryOp::Or => Some(self.counted_truth(cx, &b.left)? | self.counted_truth(cx, &b.right)?),
+                BinaryOp::Add | BinaryOp::Sub | BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow => None,
+                op => Some(comparison(op).holds(&self.counted(cx, &b.left)?, &self.counted(cx, &b.right)?)),
+            },
+            _ => None,
+        }
+    }
+
+    /// A whole number, the variable of a repetition, or their sum or difference.
+    fn counted(&self, cx: &Reading<'_>, e: &ast::Expr) -> Option<i64> {
+        match &e.kind {
+            ExprKind::Number(n) if n.unit.is_none() => n.text.parse().ok(),
+            ExprKind::Path(path) => match &path.parts[..] {
+                [part] if part.indices.is_empty() => {
+                    let name = part.name.text.as_str();
+                    let is_other =
+                        cx.formals.iter().any(|f| f.0 == name) || cx.law && matches!(name, "e" | "f" | "q" | "p");
+                    self.repeats.variable(cx.here.turn, name).filter(|_| !is_other)
+                }
+                _ => None,
+            },
+            ExprKind::Binary(b) => {
+                let (left, right) = (self.counted(cx, &b.left)?, self.counted(cx, &b.right)?);
+                match b.op {
+                    BinaryOp::Add => left.checked_add(right),
+                    BinaryOp::Sub => left.checked_sub(right),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
     }
 
     fn call(&mut self, cx: &Reading<'_>, call: &'a ast::Call, span: Span) -> Option<Value> {
