@@ -182,7 +182,7 @@ int main(int argc, char **argv)
     for (batch = 0; batch < BATCHES; ++batch) {
         q = 0.0;
         clock_gettime(CLOCK_MONOTONIC, &from);
-        for (k = 0; k < count; ++k) { dq = rate(q / 0.1); q += 1e-9 * dq; }
+        for (k = 0; k < count; ++k) { dq = rate(q / 0.1); q += 1e-9 * (dq + 1.0); }
         clock_gettime(CLOCK_MONOTONIC, &to);
         times[batch] = ((to.tv_sec - from.tv_sec) * 1e9 + (to.tv_nsec - from.tv_nsec)) / count;
     }
