@@ -150,7 +150,7 @@ impl<'a, M: Recording + Parameters> Audited<'a, M> {
         tracked.zip(&self.book.neglected).for_each(|(&symbol, error)| auditor.neglect(symbol, *error));
         auditor.tolerate(self.book.tolerance);
         if let Some(last) = self.book.part() {
-            look(&mut auditor, &self.book.recorded, &last);
+            look(&mut auditor, &self.book.recorded, &last, &mut Vec::new());
         }
         AuditReport::from(auditor.finish())
     }
@@ -394,10 +394,13 @@ impl Book {
 
     /// Audits what has been recorded, and keeps the last sample to go on from.
     fn audit(&mut self) {
-        if let Some(part) = self.part() {
-            self.samples.reserve(part.samples.len());
-            self.auditor = self.auditor.take().map(|auditor| auditor.take(&self.recorded, part));
-        }
+        let (Some(part), Some(auditor)) = (self.part(), self.auditor.take()) else { return };
+        let size = part.samples.len();
+        let (auditor, mut room) = auditor.take(&self.recorded, part);
+        room.clear();
+        room.reserve(size);
+        room.append(&mut self.samples);
+        (self.auditor, self.samples) = (Some(auditor), room);
     }
 
     /// What has been recorded since the last part, from its last sample on, which is kept.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::panic::resume_unwind;
 use std::sync::Arc;
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
 use halfarrow_audit::{Auditor, Run};
@@ -24,21 +24,28 @@ pub struct Recorded {
 /// An auditor, here or in a thread of its own; the parts come to it in order, so that what it finds does not depend on where.
 pub enum PlacedAuditor {
     Here(Box<Auditor>),
-    Beside(SyncSender<Part>, JoinHandle<Option<Box<Auditor>>>),
+    Beside {
+        sender: SyncSender<Part>,
+        /// Room of parts that were looked at.
+        room: Receiver<Vec<f64>>,
+        thread: JoinHandle<Option<Box<Auditor>>>,
+    },
 }
 
 impl PlacedAuditor {
-    /// Looks at a part that another one follows; at most one waits.
-    pub fn take(self, recorded: &Arc<Recorded>, part: Part) -> PlacedAuditor {
+    /// Looks at a part that another one follows; at most one waits. Gives the room of one that was looked at, if there is
+    /// such: memory that is there is not asked for again.
+    pub fn take(self, recorded: &Arc<Recorded>, part: Part) -> (PlacedAuditor, Vec<f64>) {
         match self.moved(recorded) {
             PlacedAuditor::Here(mut auditor) => {
-                look(&mut auditor, recorded, &part);
-                PlacedAuditor::Here(auditor)
+                look(&mut auditor, recorded, &part, &mut Vec::new());
+                (PlacedAuditor::Here(auditor), part.samples)
             }
-            PlacedAuditor::Beside(sender, thread) => {
+            PlacedAuditor::Beside { sender, room, thread } => {
                 // A thread that is gone has panicked: that is told where the auditor is asked for.
                 let _ = sender.send(part);
-                PlacedAuditor::Beside(sender, thread)
+                let free = room.try_recv().unwrap_or_default();
+                (PlacedAuditor::Beside { sender, room, thread }, free)
             }
         }
     }
@@ -47,7 +54,7 @@ impl PlacedAuditor {
     pub fn into_auditor(self) -> Box<Auditor> {
         match self {
             PlacedAuditor::Here(auditor) => auditor,
-            PlacedAuditor::Beside(sender, thread) => {
+            PlacedAuditor::Beside { sender, thread, .. } => {
                 drop(sender);
                 let auditor = thread.join().unwrap_or_else(|panic| resume_unwind(panic));
                 auditor.expect("the auditor is handed over before the first part")
@@ -63,15 +70,21 @@ impl PlacedAuditor {
         }
         let (hand, handed) = sync_channel::<Box<Auditor>>(1);
         let (sender, parts) = sync_channel::<Part>(1);
+        let (back, room): (Sender<Vec<f64>>, _) = channel();
         let recorded = recorded.clone();
         let audit = move || {
             let mut auditor = handed.recv().ok()?;
-            parts.iter().for_each(|part| look(&mut auditor, &recorded, &part));
+            let mut columns = Vec::new();
+            for part in parts {
+                look(&mut auditor, &recorded, &part, &mut columns);
+                // The run may be over.
+                let _ = back.send(part.samples);
+            }
             Some(auditor)
         };
         match Builder::new().name("audit".to_string()).spawn(audit) {
             Ok(thread) => match hand.send(auditor) {
-                Ok(()) => PlacedAuditor::Beside(sender, thread),
+                Ok(()) => PlacedAuditor::Beside { sender, room, thread },
                 Err(back) => PlacedAuditor::Here(back.0),
             },
             Err(_) => PlacedAuditor::Here(auditor),
@@ -79,18 +92,18 @@ impl PlacedAuditor {
     }
 }
 
-/// Looks at a part.
-pub fn look(auditor: &mut Auditor, recorded: &Recorded, part: &Part) {
-    let columns = turned(&part.samples, recorded.names.len());
+/// Looks at a part. `columns` has room for its values.
+pub fn look(auditor: &mut Auditor, recorded: &Recorded, part: &Part, columns: &mut Vec<f64>) {
+    turn(&part.samples, recorded.names.len(), columns);
     let columns: Vec<&[f64]> = columns.chunks(part.times.len()).collect();
     let Recorded { names, parameters } = recorded;
     auditor.take(&Run { times: &part.times, names, columns: &columns, parameters });
 }
 
 /// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.
-fn turned(rows: &[f64], columns: usize) -> Vec<f64> {
+fn turn(rows: &[f64], columns: usize, all: &mut Vec<f64>) {
     let (count, side) = (rows.len() / columns.max(1), 32);
-    let mut all = vec![0.0; rows.len()];
+    all.resize(rows.len(), 0.0);
     for (row, column) in (0..count).step_by(side).flat_map(|r| (0..columns).step_by(side).map(move |c| (r, c))) {
         for i in row..count.min(row + side) {
             for j in column..columns.min(column + side) {
@@ -98,5 +111,4 @@ fn turned(rows: &[f64], columns: usize) -> Vec<f64> {
             }
         }
     }
-    all
 }
