@@ -26,8 +26,11 @@ pub struct RoutineReport {
 
 impl RoutineReport {
     fn of(executed: &Executed) -> RoutineReport {
-        let Executed { what, instructions, repaid_after, by_bytecode, machine, ref reason } = *executed;
+        let Executed { what, instructions, repaid_after, by_bytecode, machine, in_turns, ref reason } = *executed;
         let reason = match (reason, machine) {
+            (Reason::Expected(_) | Reason::Counted, false) if in_turns => {
+                format!("{by_bytecode} evaluations, equal cells together")
+            }
             (Reason::Asked, _) => "asked for".to_string(),
             (Reason::Expected(n), true) => format!("{n:.0} evaluations to come, {repaid_after} repay it"),
             (Reason::Expected(n), false) => {

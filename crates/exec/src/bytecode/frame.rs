@@ -328,7 +328,7 @@ impl Frame {
     /// One operation: its value, and by the rules of the table its rate.
     #[inline]
     #[allow(unused_variables, reason = "each rule reads what it needs")]
-    fn operation<const ALONG: bool>(&mut self, operation: &Operation) {
+    pub(super) fn operation<const ALONG: bool>(&mut self, operation: &Operation) {
         let out = operation.out;
         macro_rules! compute {
             (($k:ident $value:ident)

@@ -5,6 +5,7 @@ mod conditions;
 mod elimination;
 mod floating;
 mod frame;
+mod in_turns;
 mod instruction;
 mod newton;
 mod orientation;
@@ -21,6 +22,7 @@ pub(crate) use elimination::Lu;
 pub(crate) use frame::{Frame, SolveError};
 #[cfg(feature = "machine")]
 pub(crate) use frame::{InnerCode, PIVOT_BELOW};
+pub(crate) use in_turns::InTurns;
 #[cfg(feature = "machine")]
 pub(crate) use instruction::Register;
 pub(crate) use instruction::{Instruction, Operation, Routine, Solve};

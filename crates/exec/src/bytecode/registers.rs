@@ -104,13 +104,21 @@ impl Layout {
         Allocator { keeps: true, ..Allocator::new(self, &fixed) }.routine(source.clone())
     }
 
+    /// The same with some of the values at places of their own, from `next` on those that have [none](NONE).
+    pub fn placed(&self, source: &Code, places: Vec<Register>, next: Register) -> Routine {
+        let fixed = FxHashMap::default();
+        let allocator = Allocator { keeps: true, next, ..Allocator::new(self, &fixed) };
+        allocator.placed(source.clone(), places)
+    }
+
     /// The same, with all divisors guarded that vary.
     pub fn guarded_routine(&self, program: &Program, wanted: &[Value]) -> Routine {
         Allocator::new(self, &FxHashMap::default()).routine(program.guarded_routine(wanted).code)
     }
 }
 
-const NONE: u32 = u32::MAX;
+/// No register yet.
+pub(super) const NONE: u32 = u32::MAX;
 /// Read after the last step.
 const END: u32 = u32::MAX - 1;
 
@@ -126,8 +134,8 @@ struct Places {
 
 impl Places {
     fn of(code: &Code) -> Places {
-        let mut places = Places { register: vec![NONE; code.values.len()], ..Places::default() };
-        places.last = vec![NONE; code.values.len()];
+        let none = vec![NONE; code.values.len()];
+        let mut places = Places { register: none.clone(), last: none, ..Places::default() };
         for (step, at) in code.steps.iter().zip(0..) {
             step.for_each_read(|a| places.note(a, at));
         }
@@ -158,9 +166,14 @@ impl<'a> Allocator<'a> {
         Allocator { layout, fixed, free: Vec::new(), next: layout.size, solves: Vec::new(), keeps: false }
     }
 
-    fn routine(mut self, source: Code) -> Routine {
-        let mut places = Places::of(&source);
-        self.fixed.iter().for_each(|(&local, &register)| places.register[local as usize] = register);
+    fn routine(self, source: Code) -> Routine {
+        let mut registers = vec![NONE; source.values.len()];
+        self.fixed.iter().for_each(|(&local, &register)| registers[local as usize] = register);
+        self.placed(source, registers)
+    }
+
+    fn placed(mut self, source: Code, registers: Vec<Register>) -> Routine {
+        let mut places = Places { register: registers, ..Places::of(&source) };
         let code = source.steps.iter().zip(0..).map(|(step, at)| self.step(step, at, &mut places)).collect();
         let outputs = source.outputs.iter().map(|&a| self.register(&places, a)).collect();
         Routine { code, outputs, solves: self.solves, registers: self.next, source }

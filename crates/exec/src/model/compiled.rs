@@ -8,12 +8,12 @@ use super::jacobian::JacobianCode;
 use super::jumps::ConservedSums;
 use super::margins::Bounds;
 use super::positions::{Motion, PositionConstraints};
-use crate::bytecode::{BlockBatches, Layout, Routine};
+use crate::bytecode::{BlockBatches, InTurns, Layout, Routine};
 use halfarrow_compiler::algebra::Symbol;
 use halfarrow_compiler::program::{BlockId, ConditionId, EventTrigger, JacobianEntry, Op, Program, Value};
 use halfarrow_sim::Sparsity;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The number of a mode: of one structure of a model among those that its events lead to.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -268,6 +268,8 @@ pub(super) struct Mode {
     /// Computes what is assumed of parameters, each value with its scale.
     pub assumed: Routine,
     pub rates: Routine,
+    /// The rates in turns, where equal cells make most of them; as soon as somebody has asked.
+    pub rates_in_turns: OnceLock<Option<Arc<InTurns>>>,
     /// Computes the solutions of the Newton blocks that rates read, and no more, if there are any.
     pub solutions: Option<Routine>,
     /// The Jacobian of the rates, if it is computed at once.
@@ -343,6 +345,7 @@ impl Mode {
             batches: batches(&rates),
             solution_batches: solutions.as_ref().and_then(batches),
             rates,
+            rates_in_turns: OnceLock::new(),
             solutions,
             switching: of_state().map(|(id, _)| id).collect(),
             indicators: layout.routine(&program, &[&operands[..], &angles].concat()),

@@ -5,7 +5,7 @@ use super::compiled::Mode;
 use super::inputs::InputSignal;
 use super::recorded::Recorded;
 use super::system::What;
-use crate::bytecode::Routine;
+use crate::bytecode::{InTurns, Routine};
 use crate::machine::{Generator, MachineCode, MachineError};
 use std::sync::Arc;
 
@@ -64,6 +64,8 @@ pub struct Executed {
     pub by_bytecode: u64,
     /// Whether machine code of it was made.
     pub machine: bool,
+    /// Whether equal cells were gone through together.
+    pub in_turns: bool,
     /// Why.
     pub reason: Reason,
 }
@@ -85,6 +87,9 @@ pub enum Reason {
 #[derive(Debug, Clone, Default)]
 struct Tier {
     code: Option<Arc<MachineCode>>,
+    /// The routine in turns, where equal cells make most of it; and whether that was looked at.
+    in_turns: Option<Arc<InTurns>>,
+    looked: bool,
     /// Evaluations by bytecode after which it is made; `None`: never.
     after: Option<u64>,
     by_bytecode: u64,
@@ -154,11 +159,21 @@ impl Evaluated {
 }
 
 impl Tiers {
+    /// The routine in turns, if equal cells make most of it.
+    pub fn in_turns(&self, what: What, along: bool) -> Option<&Arc<InTurns>> {
+        self.of[Evaluated::by(what, along)? as usize].in_turns.as_ref()
+    }
+
     /// The machine code of a routine, if there is any.
     pub fn code(&self, what: What, along: bool) -> Option<&Arc<MachineCode>> {
         self.of[Evaluated::by(what, along)? as usize].code.as_ref()
     }
 }
+
+/// Routines of fewer instructions stay at hand.
+const LONG: usize = 4096;
+/// Evaluations after which it is looked for equal cells, which takes as long as some of them.
+const LOOKED_AT_AFTER: u64 = 24;
 
 /// Instructions of a routine; blocks that the solver solves count by their inner code.
 fn instructions(routine: &Routine) -> usize {
@@ -222,6 +237,7 @@ impl Model {
                 repaid_after: repaid_after(what, instructions),
                 by_bytecode: tier.by_bytecode,
                 machine: tier.code.is_some(),
+                in_turns: tier.in_turns.is_some(),
                 reason,
             })
         };
@@ -235,6 +251,19 @@ impl Model {
         if tier.code.is_some() {
             return;
         }
+        // Where it is known how often a run evaluates, nothing is made in the middle of it.
+        let is_due = match self.tiers.expected {
+            Some(expected) => expected.of(what) > LOOKED_AT_AFTER as f64,
+            None => tier.by_bytecode >= LOOKED_AT_AFTER,
+        };
+        if !tier.looked && is_due && self.tiers.execution != Execution::Machine {
+            self.look_for_turns(what);
+        }
+        let tier = &mut self.tiers.of[what as usize];
+        if tier.in_turns.is_some() {
+            tier.by_bytecode += 1;
+            return;
+        }
         if tier.after.is_none_or(|after| tier.by_bytecode < after) {
             tier.by_bytecode += 1;
             return;
@@ -244,6 +273,22 @@ impl Model {
             (tier.refused, tier.after) = (Some(why), None);
             tier.by_bytecode += 1;
         }
+    }
+
+    /// Looks whether equal cells make most of a long routine, and goes through them together from now on.
+    fn look_for_turns(&mut self, what: Evaluated) {
+        let tier = &mut self.tiers.of[what as usize];
+        tier.looked = true;
+        let Some(routine) = what.routine(&self.code, &self.recorded).filter(|r| r.code.len() >= LONG) else { return };
+        let made = || InTurns::of(&self.code.program, &self.code.layout, routine).map(Arc::new);
+        let in_turns = match what {
+            Evaluated::Rates | Evaluated::Directions => self.code.rates_in_turns.get_or_init(made).clone(),
+            _ => made(),
+        };
+        if let Some(in_turns) = &in_turns {
+            self.frame.reserve_in_turns(in_turns);
+        }
+        tier.in_turns = in_turns;
     }
 
     /// Rates by machine code from where time and states are given; false if that does not do.
@@ -300,6 +345,7 @@ impl Model {
     /// Something else is recorded; what ran as machine code does so again.
     pub(super) fn recorded_anew(&mut self) {
         let tier = &mut self.tiers.of[Evaluated::Recorded as usize];
+        (tier.in_turns, tier.looked) = (None, false);
         if tier.code.take().is_some() {
             // Without it the bytecode goes on recording.
             let _ = self.make(Evaluated::Recorded);

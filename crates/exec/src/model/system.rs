@@ -41,10 +41,12 @@ impl Model {
             What::Recorded => self.recorded.batches.as_ref(),
             What::Indicators | What::Jacobian | What::Motion | What::Pivots => None,
         });
-        match (self.tiers.code(what, along), along) {
-            (Some(code), _) => code.run(&mut self.frame, routine)?,
-            (None, false) => self.frame.run(routine)?,
-            (None, true) => self.frame.run_along(routine)?,
+        match (self.tiers.code(what, along), self.tiers.in_turns(what, along), along) {
+            (Some(code), ..) => code.run(&mut self.frame, routine)?,
+            (None, Some(in_turns), false) => self.frame.run_in_turns::<false>(in_turns)?,
+            (None, Some(in_turns), true) => self.frame.run_in_turns::<true>(in_turns)?,
+            (None, None, false) => self.frame.run(routine)?,
+            (None, None, true) => self.frame.run_along(routine)?,
         }
         let registers = if along { &self.frame.d } else { &self.frame.r };
         Ok(routine.outputs.iter().all(|&out| registers[out as usize].is_finite()))
