@@ -121,6 +121,12 @@ impl<K: Id, V: Clone> std::ops::IndexMut<K> for Table<K, V> {
     }
 }
 
+impl<K: Id, V> From<Vec<V>> for Table<K, V> {
+    fn from(entries: Vec<V>) -> Self {
+        Table { entries: Arc::new(entries), key: PhantomData }
+    }
+}
+
 impl<K: Id, V> FromIterator<V> for Table<K, V> {
     fn from_iter<I: IntoIterator<Item = V>>(values: I) -> Self {
         Table { entries: Arc::new(values.into_iter().collect()), key: PhantomData }

@@ -9,6 +9,7 @@ pub mod bond_graph;
 pub mod causal_graph;
 pub mod causal_paths;
 pub mod compile;
+pub mod continuation;
 pub mod diagnostic;
 pub mod equations;
 pub mod ids;

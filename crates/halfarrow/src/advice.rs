@@ -38,7 +38,7 @@ impl Model {
     /// Whether a fixed step is too long for the fastest motion that the model has at its start, in words: which state asks for
     /// which step. `None` where it is not, where the model has no start, or more than a few hundred states.
     pub fn step_advice(&self, form: Form, method: FixedMethod, step: f64, start: Start) -> Option<String> {
-        let mut system = self.system(&self.equations_in(form).ok()?).ok()?;
+        let mut system = self.system_in(form).ok()?;
         let x = self.start(&mut system, start).ok()?;
         advice(&system, &x, method, step)
     }

@@ -23,6 +23,11 @@ pub(crate) struct Alternatives {
 }
 
 impl Alternatives {
+    /// Programs of `graph` that go on where one stops that has no states but those of the graph.
+    pub fn of_form(graph: &Arc<BondGraph>, form: Form) -> Alternatives {
+        Alternatives { graph: Arc::clone(graph), form, conserved: 0 }
+    }
+
     /// Programs of `graph` that go on where one of these equations stops. What these have as states and the graph does not,
     /// sums of stored quantities, has a value in all of them.
     pub fn new(graph: &Arc<BondGraph>, first: &Equations) -> Alternatives {

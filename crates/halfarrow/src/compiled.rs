@@ -9,6 +9,7 @@ use halfarrow_compiler::equations::Form;
 use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::unit::Unit;
 use halfarrow_exec as exec;
+use halfarrow_sim::Failure;
 
 use crate::error::{Error, Problem};
 use crate::model::Model;
@@ -36,6 +37,8 @@ pub struct Compiled {
     model: Arc<Model>,
     form: Form,
     pub(crate) ready: Ready,
+    /// Whether its program continues those of smaller models.
+    continued: bool,
     /// Whether reactions that are not unique are shared.
     shares: bool,
     /// What was set, in SI units.
@@ -61,20 +64,23 @@ impl Model {
     /// # Errors
     /// The model has errors that only later stages find.
     pub fn compile(&self, form: Form) -> Result<Compiled, Error> {
-        let equations = self.equations_in(form)?;
+        let mut continued = false;
         let ready = match self.runs_alone(form) {
-            true => {
-                let planned = self.planned(&equations);
-                drop(equations);
-                Ready::Explicit(Box::new(self.coded(planned)?))
-            }
+            true => Ready::Explicit(Box::new(match self.continued_system(form) {
+                Some(system) => {
+                    continued = true;
+                    system
+                }
+                None => self.system_in(form)?,
+            })),
             false => {
+                let equations = self.equations_in(form)?;
                 let system = Box::new(self.form_system(&equations)?);
                 let explicit = equations.residuals.is_empty() && self.graph.set_valued.is_empty();
                 Ready::Form { system, explicit }
             }
         };
-        Ok(Compiled { model: Arc::new(self.clone()), form, ready, shares: false, set: BTreeMap::new() })
+        Ok(Compiled { model: Arc::new(self.clone()), form, ready, continued, shares: false, set: BTreeMap::new() })
     }
 
     /// Whether a form runs without the minimal one beside it. Where set-valued laws have modes, those of an explicit form are
@@ -101,7 +107,7 @@ impl Model {
         };
         let inputs = shared.shares.iter().map(|share| share.index()).collect();
         let mut model = self.clone();
-        model.graph = Arc::new(shared.graph);
+        (model.graph, model.family) = (Arc::new(shared.graph), None);
         let mut compiled = model.compile(form)?;
         compiled.shares = true;
         if let Ready::Explicit(system) = &mut compiled.ready {
@@ -195,7 +201,16 @@ impl Compiled {
             let reason = "a compiled model is not prepared for minimum-norm: simulate the model itself".into();
             return Err(Problem::BadOption { reason }.into());
         }
-        self.model.simulate_with(self.ready.clone(), run, progress)
+        let done = self.model.simulate_with(self.ready.clone(), run, progress);
+        match &done {
+            // Equations that continue those of smaller models have to bear what is looked at in a run, or are not taken.
+            Err(Error::Run(stopped)) if self.continued && !matches!(stopped.failure, Failure::Interrupted { .. }) => {
+                let mut stands = self.model.as_it_stands().compile(self.form)?;
+                stands.set_all(self.set.iter().map(|(name, value)| (name.as_str(), *value)))?;
+                stands.simulate(run, progress)
+            }
+            _ => done,
+        }
     }
 
     /// The equations in minimal form, which every form has beside it.

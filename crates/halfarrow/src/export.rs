@@ -268,7 +268,7 @@ impl<'a> ExportedProgram<'a> {
         if !matches!(export.form, Form::Minimal | Form::Kane) {
             return Err(refused(EmitError::Implicit));
         }
-        let mut system = model.system(&model.equations_in(export.form)?)?;
+        let mut system = model.system_in(export.form)?;
         projected(system.program(), export.project, Method::Fixed(export.method))?;
         if export.project && export.real == Real::Float && export.target == Target::C {
             let reason = "project is for double: what float makes of positions is no drift".into();

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{BondGraph, FileError, Override};
 use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
 use halfarrow_compiler::causal_paths::{CausalPaths, find_paths};
 use halfarrow_compiler::compile::{self, Found, Reached, Text};
+use halfarrow_compiler::continuation::Family;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Equations, Form, derive_equations};
 use halfarrow_compiler::program::{Program, schedule};
@@ -22,6 +23,8 @@ use crate::watch::{StageTime, Watch};
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) graph: Arc<BondGraph>,
+    /// What the graph is the continuation of, if it is one.
+    pub(crate) family: Option<Arc<Continued>>,
     pub(crate) found: Found,
     pub(crate) watch: Watch,
     origin: Arc<Origin>,
@@ -32,6 +35,41 @@ struct Origin {
     source: Source,
     files: Arc<Remembered>,
     overrides: Vec<Override>,
+}
+
+/// Smaller models that one continues, and the program of its minimal form until somebody takes it.
+pub(crate) struct Continued {
+    family: Family,
+    minimal: Mutex<Option<Program>>,
+    /// Whether there was one.
+    has_minimal: bool,
+}
+
+impl Continued {
+    /// The family of a model, if there is one, and the model as its continuation. The program is made beside the graph.
+    fn of(text: Text<'_>) -> Option<(Continued, Reached<BondGraph>)> {
+        let mut family = Family::of(text)?;
+        loop {
+            let (reached, minimal) = rayon::join(|| family.bond_graph(), || family.program(Form::Minimal));
+            if let Some(reached) = reached {
+                let has_minimal = minimal.is_some();
+                return Some((Continued { family, minimal: Mutex::new(minimal), has_minimal }, reached));
+            }
+            family = family.larger(text)?;
+        }
+    }
+
+    /// The program of the minimal form, if it was made and is there yet.
+    fn minimal(&self, form: Form) -> Option<Program> {
+        let mut minimal = self.minimal.lock().unwrap_or_else(PoisonError::into_inner);
+        minimal.take_if(|_| form == Form::Minimal)
+    }
+}
+
+impl std::fmt::Debug for Continued {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}", self.family)
+    }
 }
 
 impl std::fmt::Debug for Origin {
@@ -71,8 +109,12 @@ impl Model {
         let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides: &overrides };
         let watch = Watch::default();
         let read = watch.time("ast", || compile::read(text));
-        let Reached { ir: graph, found } = watch.time("bond_graph", || compile::bond_graph_of(read, text))?;
-        Ok(Model { graph: Arc::new(graph), found, watch, origin: Arc::new(Origin { source, files, overrides }) })
+        let (family, Reached { ir: graph, found }) = watch.time("bond_graph", || match Continued::of(text) {
+            Some((family, reached)) => Ok((Some(Arc::new(family)), reached)),
+            None => compile::bond_graph_of(read, text).map(|reached| (None, reached)),
+        })?;
+        let origin = Arc::new(Origin { source, files, overrides });
+        Ok(Model { graph: Arc::new(graph), family, found, watch, origin })
     }
 
     /// The same model with other values of parameters in the place of those that it has. Files are not read again.
@@ -88,7 +130,7 @@ impl Model {
 
     /// The same model with another graph.
     pub(crate) fn with_graph(&self, graph: BondGraph) -> Model {
-        Model { graph: Arc::new(graph), ..self.clone() }
+        Model { graph: Arc::new(graph), family: None, ..self.clone() }
     }
 
     /// Its text, and the files that it read: the same model can be made of them elsewhere.
@@ -177,6 +219,24 @@ impl Model {
 
     pub(crate) fn paths_of(&self, causal: &CausalGraph) -> CausalPaths {
         self.watch.time("causal_paths", || find_paths(causal))
+    }
+
+    /// The same model without smaller ones that it continues.
+    pub(crate) fn as_it_stands(&self) -> Model {
+        Model { family: None, ..self.clone() }
+    }
+
+    /// The program of a model that continues smaller ones, as the continuation of theirs.
+    pub(crate) fn continued_program(&self, form: Form) -> Option<Program> {
+        let own = self.family.as_ref()?;
+        if let Some(minimal) = own.minimal(form) {
+            return Some(minimal);
+        }
+        let Origin { source, overrides, .. } = &*self.origin;
+        let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides };
+        let again = form != Form::Minimal || own.has_minimal;
+        let first = again.then(|| own.family.program(form)).flatten();
+        first.or_else(|| own.family.larger(text)?.program(form))
     }
 
     pub(crate) fn program_of(&self, equations: &Equations) -> Program {

@@ -182,7 +182,7 @@ impl Model {
         stop: &AtomicBool,
     ) -> Result<RealTimeReport, Error> {
         let pace = pace(run)?;
-        let mut system = self.system(&self.equations_in(Form::Minimal)?)?;
+        let mut system = self.system_in(Form::Minimal)?;
         if run.method.takes_jacobian() {
             system.prepare_derivatives().map_err(|failure| self.stopped(failure))?;
         }

@@ -542,7 +542,7 @@ impl Model {
 
     /// A form beside the minimal one.
     pub(crate) fn form_system(&self, equations: &Equations) -> Result<exec::ImplicitModel, Error> {
-        self.form_beside(equations, self.system(&self.equations_in(Form::Minimal)?)?)
+        self.form_beside(equations, self.system_in(Form::Minimal)?)
     }
 
     /// The same beside a minimal form that is there already.
@@ -582,6 +582,23 @@ impl Model {
             tolerances: Vec::new(),
             timings: Timings::default(),
         }
+    }
+
+    /// The system of an explicit form.
+    pub(crate) fn system_in(&self, form: Form) -> Result<exec::Model, Error> {
+        let equations = self.equations_in(form)?;
+        let planned = self.planned(&equations);
+        drop(equations);
+        self.coded(planned)
+    }
+
+    /// The same as the continuation of smaller ones, where the model continues such.
+    pub(crate) fn continued_system(&self, form: Form) -> Option<exec::Model> {
+        self.family.as_ref()?;
+        let program = self.watch.time("program", || self.continued_program(form))?;
+        let system = self.coded((program, Arc::new(Alternatives::of_form(&self.graph, form)))).ok()?;
+        // What was decided by the values of parameters may be otherwise in a larger model.
+        system.broken().is_none().then_some(system)
     }
 
     pub(crate) fn system(&self, equations: &Equations) -> Result<exec::Model, Error> {

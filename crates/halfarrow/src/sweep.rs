@@ -203,7 +203,7 @@ impl Model {
 
     /// All that a sweep needs before its first run.
     fn prepare(&self, sweep: &Sweep) -> Result<Prepared, Error> {
-        self.prepare_with(self.system(&self.equations_in(sweep.run.form)?)?, sweep)
+        self.prepare_with(self.system_in(sweep.run.form)?, sweep)
     }
 
     fn prepare_with(&self, mut system: exec::Model, sweep: &Sweep) -> Result<Prepared, Error> {

@@ -11,6 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::exprs::Exprs;
+use super::listed::ListedAssumptions;
 use super::node::{Expr, Function, Node};
 use super::properties::{Known, Signs};
 
@@ -118,6 +119,13 @@ impl Assumptions {
         (0..8 * self.decided.len() as u32).map(Expr).filter(|&e| self.decided(e).has(what)).collect()
     }
 
+    /// Takes what is listed for assumed.
+    pub(super) fn list(&mut self, listed: &ListedAssumptions) {
+        self.divisors.extend(&listed.divisors);
+        self.defined.extend(&listed.defined);
+        listed.decided.iter().for_each(|&(e, what)| self.decide(e, what));
+    }
+
     pub(super) fn has_divisors(&self) -> bool {
         !self.divisors.is_empty() || !self.defined.is_empty()
     }
@@ -136,6 +144,21 @@ impl Assumptions {
 }
 
 impl Exprs {
+    /// What was assumed, as a list.
+    pub fn listed_assumptions(&self) -> ListedAssumptions {
+        let sorted = |set: &FxHashSet<Expr>| {
+            let mut all: Vec<Expr> = set.iter().copied().collect();
+            all.sort_unstable();
+            all
+        };
+        let decided = (0..self.len() as u32).map(|e| (Expr(e), self.assumptions.decided(Expr(e)).0));
+        ListedAssumptions {
+            divisors: sorted(&self.assumptions.divisors),
+            defined: sorted(&self.assumptions.defined),
+            decided: decided.filter(|(_, what)| *what != 0).collect(),
+        }
+    }
+
     /// What is assumed at present, to [go on with](Exprs::suppose) once more.
     pub fn assumed(&self) -> Assumptions {
         self.assumptions.clone()

@@ -3,6 +3,7 @@
 use super::exprs::Exprs;
 use super::fingerprint::mix;
 use super::grown::{Place, place};
+use super::listed::ListedSymbol;
 use super::node::{Expr, Facts, Node, Symbol};
 use std::cmp::Ordering;
 
@@ -144,6 +145,14 @@ impl Exprs {
         self.add_hashed(hash_label(label), (label, name), kind, facts)
     }
 
+    /// The next symbol of a list; `None` if one has its label already.
+    pub(super) fn list_symbol(&mut self, listed: &ListedSymbol<'_>) -> Option<Symbol> {
+        let &ListedSymbol { label, name, kind, facts } = listed;
+        let hash = hash_label(label);
+        let is_new = self.find_hashed(hash, label).is_none();
+        is_new.then(|| self.add_hashed(hash, (label, name), kind, facts))
+    }
+
     fn add_hashed(&mut self, hash: u64, (label, name): (&str, &str), kind: SymbolKind, facts: Facts) -> Symbol {
         let id = u32::try_from(self.symbols.len()).expect("fewer than 2^32 symbols");
         let mut push = |text: &str| self.texts.add(text.len(), |out| out.push_str(text));
@@ -243,7 +252,7 @@ fn hash_label(label: &str) -> u64 {
 }
 
 /// Labels in alphabetical order, numbers in them by their size: `q2` before `q10`.
-fn natural_order(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     let same = a.iter().zip(b).take_while(|(x, y)| x == y).count();
     // A number counts whole.

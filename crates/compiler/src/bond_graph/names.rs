@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use super::flatten::Flat;
 use super::scope::{ComponentId, Decl, DeclKind, Node, Scope, Valued};
 use super::uses::{Used, Uses};
+use crate::algebra::natural_order;
 use crate::ast::Ast;
 use crate::diagnostic::Sources;
 use crate::span::{FileId, Span};
@@ -124,7 +125,8 @@ pub(super) fn table(
     all.extend(values(flat, &mut of));
     all.extend(nodes(flat, &mut of));
     all.extend(components(flat, &mut of));
-    all.sort_by(|a, b| (a.kind, a.declared, &a.name).cmp(&(b.kind, b.declared, &b.name)));
+    let by_name = |a: &Name, b: &Name| natural_order(&a.name, &b.name);
+    all.sort_by(|a, b| (a.kind, a.declared).cmp(&(b.kind, b.declared)).then_with(|| by_name(a, b)));
     all
 }
 

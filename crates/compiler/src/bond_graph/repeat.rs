@@ -10,7 +10,7 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 
 /// The greatest number of turns of all repetitions together, and of elements of arrays.
-pub(super) const MAX_TURNS: usize = 4_000_000;
+pub(crate) const MAX_TURNS: usize = 4_000_000;
 
 /// The greatest number of terms of all sums together.
 const MAX_TERMS: usize = 16_000_000;

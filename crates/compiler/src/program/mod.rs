@@ -55,7 +55,7 @@ pub use repetition::Repetition;
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;
 pub use start::StartGroup;
-pub use values::{Reads, Values};
+pub use values::{ListedValues, Reads, Values};
 pub use verify::verify;
 
 use std::collections::BTreeMap;

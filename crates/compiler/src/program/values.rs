@@ -31,6 +31,14 @@ impl Reads {
     pub fn without(self, other: Reads) -> Reads {
         Reads(self.0 & !other.0)
     }
+    /// As a number.
+    pub fn bits(self) -> u8 {
+        self.0
+    }
+    /// What a number stands for.
+    pub fn of_bits(bits: u8) -> Reads {
+        Reads(bits)
+    }
     /// Whether it includes the other.
     pub fn includes(self, other: Reads) -> bool {
         self.0 & other.0 == other.0 && other.0 != 0
@@ -45,6 +53,39 @@ pub struct Values {
     known: HashTable<Value>,
     /// What values are at a few points, from the first product on that moving values make.
     samples: Option<Box<Samples>>,
+}
+
+/// Values that are made of a list of operations.
+#[derive(Debug)]
+pub struct ListedValues(Values, Vec<Op>);
+
+impl ListedValues {
+    /// None yet, with room for so many.
+    pub fn of(count: usize) -> ListedValues {
+        let (ops, reads) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        ListedValues(Values { reads, known: HashTable::with_capacity(count), ..Values::default() }, ops)
+    }
+
+    /// Adds the next; `None` if it is there already, or reads what is not.
+    pub fn add(&mut self, op: Op, reads: Reads) -> Option<()> {
+        let ListedValues(values, ops) = self;
+        let mut is_known = true;
+        op.for_each_operand(|v| is_known &= (v.0 as usize) < ops.len());
+        let at = spot(op);
+        if !is_known || values.known.find(at, |value| ops[value.0 as usize] == op).is_some() {
+            return None;
+        }
+        values.known.insert_unique(at, Value(ops.len() as u32), |value| spot(ops[value.0 as usize]));
+        ops.push(op);
+        values.reads.push(reads);
+        Some(())
+    }
+
+    /// All of them.
+    pub fn finish(self) -> Values {
+        let ListedValues(values, ops) = self;
+        Values { ops: ops.into(), ..values }
+    }
 }
 
 /// Where an operation is looked for: near others of operands of about the same time.

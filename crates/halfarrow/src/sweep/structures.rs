@@ -74,7 +74,7 @@ impl Structures {
 
 fn derived(first: &Structure, sweep: &Sweep, plan: &Plan, set: usize) -> Result<Structure, Error> {
     let model = first.model.with(&overrides(plan, set))?;
-    let mut system = model.system(&model.equations_in(sweep.run.form)?)?;
+    let mut system = model.system_in(sweep.run.form)?;
     connect(&system.program().inputs.clone(), &sweep.run.inputs, |name, t, v| system.connect(name, t, v))?;
     let observed = &first.system.program().observed;
     let recorded = first.system.recorded().iter().map(|&i| observed[i].name.to_string()).collect();

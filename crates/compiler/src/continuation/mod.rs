@@ -1,0 +1,219 @@
+//! Models of many equal cells: what a stage gives for three sizes that follow each other is continued to the size asked for.
+//!
+//! A parameter that only [counts] the turns of a repetition makes a family of models, one for each size. What is made far
+//! from the ends of the repetition is made of the same text in the same way, so the graphs, and the programs, of three
+//! sizes tell those of all: each sequence in them is a few entries that stand alone and a few that come again turn by turn,
+//! each number a straight line in the turn and in the size (`rule.rs`). A rule has to give the three it was found from
+//! exactly, and one much larger, in which names have more digits and each turn has left both ends behind; where it does
+//! not, or the text is none of a family, there is no continuation, and the model is compiled as it stands.
+
+mod graph;
+mod parts;
+mod program;
+mod rule;
+mod segments;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+use std::sync::Arc;
+
+use crate::ast::{Count, counts};
+use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, Name, NameKind, Override, SET};
+use crate::causal_graph::assign_causality;
+use crate::compile::{Found, Reached, Text, to_bond_graph};
+use crate::diagnostic::Sources;
+use crate::equations::{Form, derive_equations};
+use crate::program::{Program, schedule};
+use crate::span::FileId;
+use rule::Rule;
+use tree::{At, Kept, Part, Tree, constants, parts};
+
+constants!(NameKind);
+
+parts! {
+    structure Name { name, kind, declared, uses }
+}
+
+/// The size of the smallest model that is looked at, unless its text reaches further; and if those that follow it tell
+/// nothing: parts of some hundred variables are gone through in other ways than small ones.
+const SMALLEST: [i64; 2] = [16, 104];
+/// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
+const STEP: i64 = 2;
+/// The least size of the one that a rule is tried on: names of cells have three digits there.
+const TRIED: i64 = 104;
+/// Models are this much larger than the one it is tried on, or are compiled as they stand.
+const LARGER: i64 = 8;
+
+/// Models of one text that differ in the number of their cells: of three sizes that follow each other, and of one that is much
+/// larger.
+#[derive(Debug)]
+pub struct Family {
+    members: Vec<Member>,
+    steps: Steps,
+    /// Which of the smallest sizes its members begin with, and the size of the first of them.
+    smallest: usize,
+    first: i64,
+    /// The texts of the model itself.
+    sources: Sources,
+    /// Elements in a step of the size.
+    elements: usize,
+}
+
+/// Its graph, and the names in its text.
+type Member = (Arc<BondGraph>, Arc<Vec<Name>>);
+
+/// How many steps in size each member is larger than the first, and how many the model that is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    members: [i64; 4],
+    wanted: i64,
+}
+
+impl Family {
+    /// The family of a model; `None` if there is none, or the model is hardly larger than what would be looked at.
+    pub fn of(text: Text<'_>) -> Option<Family> {
+        Family::from(text, 0)
+    }
+
+    /// The same family by larger members.
+    pub fn larger(&self, text: Text<'_>) -> Option<Family> {
+        Family::from(text, self.smallest + 1)
+    }
+
+    fn from(text: Text<'_>, smallest: usize) -> Option<Family> {
+        let sized = Sized::of(text)?;
+        let (first, steps) = sized.steps(smallest)?;
+        let (mut members, mut sources) = (Vec::new(), None);
+        for step in steps.members {
+            let Reached { ir, found } = sized.member(first + STEP * step)?;
+            if !sized.is_all_that_shapes(&ir) {
+                return None;
+            }
+            sources = Some(found.sources);
+            members.push((Arc::new(ir), found.names));
+        }
+        let sources = sized.sources(&sources?);
+        let elements = members[1].0.elements.len().saturating_sub(members[0].0.elements.len());
+        Some(Family { members, steps, smallest, first, sources, elements })
+    }
+
+    /// The model itself as the continuation of smaller ones.
+    pub fn bond_graph(&self) -> Option<Reached<BondGraph>> {
+        // What is too large is refused where it is compiled as it stands.
+        if self.elements.saturating_mul(self.steps.wanted as usize) > MAX_PARTS {
+            return None;
+        }
+        let (graph, names) = self.continued(|at| Some(self.members[at].clone()))?;
+        let found = Found { names, sources: self.sources.clone(), ..Found::default() };
+        let ir = Arc::unwrap_or_clone(graph);
+        (ir.cells.len() <= MAX_TURNS).then_some(Reached { ir, found })
+    }
+
+    /// The program of the model in a form as the continuation of those of smaller ones, if there is one.
+    pub fn program(&self, form: Form) -> Option<Program> {
+        self.continued(|at| {
+            let equations = derive_equations(&assign_causality(&self.members[at].0).ok()?, form).ok()?;
+            // States that are sums of what storages hold have names of their own in other modes of a run.
+            let is_plain = equations.meanings.is_empty() && equations.conserved.is_empty();
+            is_plain.then(|| schedule(&equations))
+        })
+    }
+
+    /// What the rule of three members gives for the model that is asked for, if it gives the fourth.
+    fn continued<T: Part>(&self, mut member: impl FnMut(usize) -> Option<T>) -> Option<T> {
+        let Steps { members, wanted } = self.steps;
+        let mut kept = Kept::default();
+        let mut tree = |at: usize| {
+            kept.size = self.first + STEP * members[at];
+            member(at).map(|member| member.tree(&mut kept))
+        };
+        let rule = Rule::learned([&tree(0)?, &tree(1)?, &tree(2)?])?;
+        let is_right = rule.gives(&tree(3)?, 0, members[3]);
+        is_right.then(|| T::made(&rule, &At { turn: 0, size: wanted, kept: &kept }))?
+    }
+}
+
+/// A model, and what counts its cells.
+struct Sized<'t> {
+    text: Text<'t>,
+    count: Count,
+    /// How many there are.
+    size: i64,
+    /// Whether that is set from outside, and not by the text.
+    is_set: bool,
+}
+
+impl<'t> Sized<'t> {
+    /// By the parameter with the greatest value, of those that only count.
+    fn of(text: Text<'t>) -> Option<Sized<'t>> {
+        let sized = counts(text.text).into_iter().filter_map(|count| {
+            let set = text.overrides.iter().rfind(|set| set.name.trim() == count.name);
+            let size = set.map_or(Some(count.value), |set| set.value.trim().parse().ok())?;
+            Some(Sized { text, size, is_set: set.is_some(), count })
+        });
+        sized.max_by_key(|sized| sized.size)
+    }
+
+    /// The size of the smallest member, and how much larger the others are; `None` if the model itself is not much larger.
+    fn steps(&self, smallest: usize) -> Option<(i64, Steps)> {
+        let reach = self.count.reach;
+        let odd = self.size.rem_euclid(STEP);
+        let first = SMALLEST.get(smallest)?.max(&(2 * reach + 8)) / STEP * STEP + odd;
+        let tried = TRIED.max(2 * first) / STEP * STEP + odd;
+        let steps = Steps { members: [0, 1, 2, (tried - first) / STEP], wanted: (self.size - first) / STEP };
+        (reach <= SMALLEST[0] && (LARGER * tried..=MAX_TURNS as i64).contains(&self.size)).then_some((first, steps))
+    }
+
+    /// The model with so many cells, if there is nothing to be said of it.
+    fn member(&self, size: i64) -> Option<Reached<BondGraph>> {
+        // As many digits as before: places in the text stay where they are.
+        let padded =
+            |digits: &str| Some(format!("{size:0width$}", width = digits.len())).filter(|p| p.len() == digits.len());
+        let Text { text, overrides, .. } = self.text;
+        let (start, end) = (self.count.span.start as usize, self.count.span.end as usize);
+        let own = match self.is_set {
+            true => text.to_string(),
+            false => [&text[..start], &padded(&text[start..end])?, &text[end..]].concat(),
+        };
+        let mut overrides = overrides.to_vec();
+        for set in overrides.iter_mut().filter(|set| self.is_size(set)) {
+            set.value = padded(&set.value)?;
+        }
+        let member = to_bond_graph(Text { text: &own, overrides: &overrides, ..self.text }).ok()?;
+        member.found.diagnostics.0.is_empty().then_some(member)
+    }
+
+    /// Whether no number but the size, and such as stand in the text for all cells alike, decides what there is in a member; and
+    /// nothing is made of the size but the value of its parameter.
+    fn is_all_that_shapes(&self, member: &BondGraph) -> bool {
+        let own = member.parameters.values().find(|p| p.name == self.count.name);
+        let mut others = member.parameters.values().filter(|p| p.shapes && p.name != self.count.name);
+        if !others.all(|p| !p.name.contains(['[', '.'])) {
+            return false;
+        }
+        let mut kept = Kept::default();
+        member.tree(&mut kept);
+        // As its value, and as what its symbol is known to be.
+        own.is_some_and(|own| kept.met.iter().filter(|e| **e == own.value).count() == 2)
+    }
+
+    fn is_size(&self, set: &Override) -> bool {
+        set.name.trim() == self.count.name
+    }
+
+    /// The texts of the model, by those of a member.
+    fn sources(&self, member: &Sources) -> Sources {
+        let mut sources = member.clone();
+        let main = self.count.span.file;
+        sources.replace(main, self.text.text);
+        // Values that are set have texts of their own, in order.
+        let files = (main.0 + 1..member.texts().len() as u32).map(FileId);
+        let of_values = files.filter(|&file| member.name(file).starts_with(SET));
+        for (file, set) in of_values.zip(self.text.overrides).filter(|(_, set)| self.is_size(set)) {
+            let own = member.text(file);
+            sources.replace(file, [&own[..own.len() - set.value.len()], &set.value].concat());
+        }
+        sources
+    }
+}
