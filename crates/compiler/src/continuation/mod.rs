@@ -37,7 +37,8 @@ parts! {
 
 /// The size of the smallest model that is looked at, unless its text reaches further; and if those that follow it tell
 /// nothing: parts of some hundred variables are gone through in other ways than small ones.
-const SMALLEST: [i64; 2] = [16, 104];
+/// Where a number of the text is one of the first sizes, the second are looked at.
+const SMALLEST: [i64; 3] = [16, 30, 104];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;
 /// The least size of the one that a rule is tried on: names of cells have three digits there.
@@ -73,12 +74,13 @@ struct Steps {
 impl Family {
     /// The family of a model; `None` if there is none, or the model is hardly larger than what would be looked at.
     pub fn of(text: Text<'_>) -> Option<Family> {
-        Family::from(text, 0)
+        (0..SMALLEST.len()).find_map(|smallest| Family::from(text, smallest))
     }
 
-    /// The same family by larger members.
+    /// The same family by the largest members, if these are smaller.
     pub fn larger(&self, text: Text<'_>) -> Option<Family> {
-        Family::from(text, self.smallest + 1)
+        let last = SMALLEST.len() - 1;
+        (self.smallest < last).then(|| Family::from(text, last))?
     }
 
     fn from(text: Text<'_>, smallest: usize) -> Option<Family> {

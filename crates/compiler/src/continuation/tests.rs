@@ -303,6 +303,7 @@ fn numbers_that_grow_from_cell_to_cell_are_not_continued() {
         to_bond_graph(text(&small)).unwrap_or_else(|found| panic!("{}", found.render(false)));
     }
     exactly(900, &row("", ""));
+    exactly(900, &row("", "a[3] -> R:same_as_a_size(16)\na[4] -> R:and_another(20)"));
     exactly(900, &row("", "param m = 3\nfor j in 1..m {\n a[j] -> R:leak[j](1)\n }"));
 }
 
