@@ -35,9 +35,9 @@ parts! {
     structure Name { name, kind, declared, uses }
 }
 
-/// The size of the smallest model that is looked at, unless its text reaches further; and if those that follow it tell
-/// nothing: parts of some hundred variables are gone through in other ways than small ones.
-/// Where a number of the text is one of the first sizes, the second are looked at.
+/// The size of the smallest model that is looked at, unless its text reaches further: the first; the second where the first, or
+/// one that follows it, is a number of the text; the last where those before tell nothing, since parts of some hundred
+/// variables are gone through in other ways than small ones.
 const SMALLEST: [i64; 3] = [16, 30, 104];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;

@@ -1,12 +1,12 @@
 //! Where the entries of a sequence come turn by turn.
 
-use std::cmp::Reverse;
 use std::hash::{Hash, Hasher};
 
-use rustc_hash::{FxHashMap, FxHasher};
+use rustc_hash::FxHasher;
 
 use super::rule::pieces;
 use super::tree::Tree;
+use crate::program::frequent_distances;
 
 /// The fewest turns that count as such.
 const TURNS: usize = 6;
@@ -16,8 +16,6 @@ const TURNS: usize = 6;
 const ROWS: [usize; 3] = [1, 3, 12];
 /// Periods up to this one are tried in any case.
 const SHORT: usize = 12;
-/// Periods tried for each of them, the most frequent first.
-const PERIODS: usize = 24;
 
 /// Entries that come turn by turn, or a single one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,18 +94,9 @@ fn periods(outlines: &[Outline]) -> Vec<usize> {
     let shapes: Vec<u64> = outlines.iter().map(|outline| outline.shape).collect();
     let steps: Vec<u64> = outlines.windows(2).map(|two| step(&two[0], &two[1]).unwrap_or(two[0].shape)).collect();
     let mut all: Vec<usize> = (1..=SHORT).filter(|period| period * TURNS <= outlines.len()).collect();
-    for (marks, row) in [&shapes, &steps].into_iter().flat_map(|marks| ROWS.map(|row| (marks, row))) {
-        let mut before: FxHashMap<&[u64], usize> = FxHashMap::default();
-        let mut count: FxHashMap<usize, usize> = FxHashMap::default();
-        for (at, marks) in marks.windows(row).enumerate() {
-            if let Some(last) = before.insert(marks, at) {
-                *count.entry(at - last).or_default() += 1;
-            }
-        }
-        let fits = |&(distance, times): &(usize, usize)| distance * TURNS <= outlines.len() && times >= TURNS - 1;
-        let mut often: Vec<(usize, usize)> = count.into_iter().filter(fits).collect();
-        often.sort_unstable_by_key(|&(distance, times)| (Reverse(times), distance));
-        all.extend(often.into_iter().map(|(distance, _)| distance).take(PERIODS));
+    let fits = |distance: usize, times: usize| distance * TURNS <= outlines.len() && times >= TURNS - 1;
+    for marks in [&shapes, &steps] {
+        all.extend(ROWS.into_iter().flat_map(|row| frequent_distances(marks.windows(row), fits)));
     }
     all.sort_unstable();
     all.dedup();

@@ -52,6 +52,7 @@ pub use op::{Bits, Cost, Op};
 pub use parts::RatesInParts;
 pub use ratios::{Ratios, Told};
 pub use repetition::Repetition;
+pub(crate) use repetition::frequent_distances;
 pub use routine::{Arg, Code, Local, Method, Routine, Solve, Step};
 pub use schedule::schedule;
 pub use start::StartGroup;

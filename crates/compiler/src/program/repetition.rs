@@ -4,6 +4,7 @@
 use super::routine::{Arg, Code, Local};
 use rustc_hash::FxHashMap;
 use std::collections::BinaryHeap;
+use std::hash::Hash;
 
 /// Repetitions of fewer turns are none.
 const TURNS: usize = 8;
@@ -95,23 +96,28 @@ fn candidates(kinds: &[u32]) -> Vec<(Repetition, usize)> {
 
 /// Distances at which the same rows of steps come again, the most frequent ones for each length of a row.
 fn periods(kinds: &[u32]) -> Vec<usize> {
-    let mut all = Vec::new();
-    for row in ROWS {
-        let mut before: FxHashMap<u64, usize> = FxHashMap::default();
-        let mut count: FxHashMap<usize, usize> = FxHashMap::default();
-        for (at, mark) in marks(kinds, row).enumerate() {
-            if let Some(last) = before.insert(mark, at) {
-                *count.entry(at - last).or_default() += 1;
-            }
-        }
-        let mut often: Vec<(usize, usize)> = count.into_iter().collect();
-        often.sort_unstable_by_key(|&(distance, times)| (std::cmp::Reverse(times), distance));
-        let fit = |distance: &usize| distance * TURNS <= kinds.len();
-        all.extend(often.into_iter().map(|(distance, _)| distance).filter(fit).take(PERIODS));
-    }
+    let fits = |distance: usize, _| distance * TURNS <= kinds.len();
+    let mut all: Vec<usize> = ROWS.into_iter().flat_map(|row| frequent_distances(marks(kinds, row), fits)).collect();
     all.sort_unstable();
     all.dedup();
     all
+}
+
+/// Distances at which equal marks follow each other: of those that fit, by distance and how often it comes, the most frequent.
+pub(crate) fn frequent_distances<M: Eq + Hash>(
+    marks: impl Iterator<Item = M>,
+    fits: impl Fn(usize, usize) -> bool,
+) -> impl Iterator<Item = usize> {
+    let mut before: FxHashMap<M, usize> = FxHashMap::default();
+    let mut count: FxHashMap<usize, usize> = FxHashMap::default();
+    for (at, mark) in marks.enumerate() {
+        if let Some(last) = before.insert(mark, at) {
+            *count.entry(at - last).or_default() += 1;
+        }
+    }
+    let mut often: Vec<(usize, usize)> = count.into_iter().filter(|&(distance, times)| fits(distance, times)).collect();
+    often.sort_unstable_by_key(|&(distance, times)| (std::cmp::Reverse(times), distance));
+    often.into_iter().map(|(distance, _)| distance).take(PERIODS)
 }
 
 /// A number for each row of so many kinds; equal rows have the same.
