@@ -35,6 +35,14 @@ impl AtOnce {
         self.passed.iter_mut().zip(power).for_each(|(sum, own)| *sum += own.abs());
     }
 
+    /// What these storages hold and others, and what passes all ports.
+    pub fn with(mut self, more: AtOnce) -> AtOnce {
+        let add = |all: &mut Vec<f64>, more: Vec<f64>| all.iter_mut().zip(more).for_each(|(sum, own)| *sum += own);
+        add(&mut self.stored, more.stored);
+        add(&mut self.passed, more.passed);
+        self
+    }
+
     /// Where so many steps gain or lose most, beyond what can have passed.
     pub fn worst(&self, times: &[f64], steps: usize) -> Option<Raw> {
         let beyond = |&(change, passed, _): &(f64, f64, usize)| change - passed;

@@ -1,13 +1,18 @@
 //! What is stored changes by what flows in.
 
 use crate::at_once::{AtOnce, STRETCHES};
+use crate::lanes::{are_finite, greatest, greatest_product, higher};
 use crate::laws::sensitivities;
-use crate::quadrature::gauss;
+use crate::on_all_cores::on_all_cores;
+use crate::quadrature::{Integral, gauss};
 use crate::scales::{Quantity, Scales, Settled, Term};
 use crate::values::Values;
 use crate::worst::{Raw, Worst, above};
 use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Symbol};
-use halfarrow_compiler::bond_graph::{BondGraph, Element, ElementId, Kind, Meaning, PortRef, Storage, StorageLaw};
+use halfarrow_compiler::bond_graph::{
+    BondGraph, Element, ElementId, IntegratedSignal, Kind, Meaning, PortRef, Storage, StorageLaw,
+};
+use smallvec::SmallVec;
 use std::collections::BTreeSet;
 
 /// Storages whose law reads more than their own variables and parameters: they make or eat energy.
@@ -15,8 +20,8 @@ pub(crate) fn notes(graph: &BondGraph) -> Vec<String> {
     let mut notes = Vec::new();
     for (id, element) in graph.elements.iter() {
         if let Kind::Inertance(storage) | Kind::Compliance(storage) = &element.kind {
-            let names: Vec<&str> =
-                outside(graph, id, element, storage).into_iter().map(|s| graph.exprs.name(s)).collect();
+            let found: BTreeSet<Symbol> = outside(graph, id, element, storage).collect();
+            let names: Vec<&str> = found.into_iter().map(|s| graph.exprs.name(s)).collect();
             if !names.is_empty() {
                 let names = names.join(", ");
                 notes.push(format!("{} makes or eats energy: its law changes with {names}", element.name));
@@ -27,17 +32,23 @@ pub(crate) fn notes(graph: &BondGraph) -> Vec<String> {
 }
 
 /// What the laws of a storage read besides its own variables and parameters.
-fn outside(graph: &BondGraph, id: ElementId, element: &Element, storage: &Storage) -> BTreeSet<Symbol> {
-    let port = |port: u32| graph.storage_symbols(PortRef { element: id, port }).map(|(z, _)| z);
-    let own = |s: &Symbol| storage.stored.contains(s) || (0..element.ports.len() as u32).any(|p| port(p) == Some(*s));
-    let laws = storage.laws.iter().flat_map(|law| match *law {
-        StorageLaw::Integral(e) | StorageLaw::Derivative(e) | StorageLaw::Implicit(e) => [Some(e), None],
+fn outside<'g>(
+    graph: &'g BondGraph,
+    id: ElementId,
+    element: &'g Element,
+    storage: &'g Storage,
+) -> impl Iterator<Item = Symbol> + 'g {
+    let port = move |port: u32| graph.storage_symbols(PortRef { element: id, port }).map(|(z, _)| z);
+    let own =
+        move |s: &Symbol| storage.stored.contains(s) || (0..element.ports.len() as u32).any(|p| port(p) == Some(*s));
+    let law = |law: &StorageLaw| match *law {
+        StorageLaw::Integral(e) | StorageLaw::Derivative(e) | StorageLaw::Implicit(e) => e,
         // Its displacement is imposed; what it stores follows from its law alone.
-        StorageLaw::Known { law, .. } => [Some(law), None],
-    });
-    let read = laws.flatten().flat_map(|e: Expr| graph.exprs.symbols_of(e));
+        StorageLaw::Known { law, .. } => law,
+    };
+    let read = storage.laws.iter().map(law).flat_map(|e: Expr| graph.exprs.symbols_of(e));
     let parameter = |s: &Symbol| matches!(graph.variables.get(s).map(|v| v.meaning), Some(Meaning::Parameter(_)));
-    read.filter(|s| !own(s) && !parameter(s)).collect()
+    read.filter(move |s| !own(s) && !parameter(s))
 }
 
 /// What never exceeds this has not moved: methods take a state that nothing moves to be as great.
@@ -51,90 +62,111 @@ pub(crate) fn rates(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    for (id, element) in graph.elements.iter() {
-        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { continue };
+    let is_storage = |e: &Element| matches!(e.kind, Kind::Inertance(_) | Kind::Compliance(_));
+    let storages: Vec<ElementId> = graph.elements.iter().filter(|(_, e)| is_storage(e)).map(|(id, _)| id).collect();
+    let of_storages = on_all_cores(&storages, values, |storages, values| {
+        let mut check = Check::new(values, settled);
+        storages.iter().for_each(|&id| check.storage(graph, id, scales));
+        (check.worst, check.unchecked)
+    });
+    let mut check = Check::new(values, settled);
+    graph.signals.values().for_each(|signal| check.signal(graph, signal, scales));
+    for (found, missing) in of_storages.into_iter().chain([(check.worst, check.unchecked)]) {
+        worst.absorb(0, found, settled);
+        unchecked.extend(missing);
+    }
+}
+
+/// What changes by its rate at every sample.
+struct Check<'a, 'b> {
+    values: &'b Values<'a>,
+    settled: &'b Settled,
+    worst: Worst,
+    unchecked: Vec<String>,
+    /// Memory that is used again.
+    integral: Integral,
+    misses: Vec<f64>,
+}
+
+impl<'a, 'b> Check<'a, 'b> {
+    fn new(values: &'b Values<'a>, settled: &'b Settled) -> Check<'a, 'b> {
+        let (worst, integral) = Default::default();
+        Check { values, settled, worst, unchecked: Vec::new(), integral, misses: Vec::new() }
+    }
+
+    fn storage(&mut self, graph: &BondGraph, id: ElementId, scales: &Scales) {
+        let (values, element) = (self.values, &graph.elements[id]);
+        let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return };
         for (port, &stored) in storage.stored.iter().enumerate() {
             let port = PortRef { element: id, port: port as u32 };
             let rate = graph.storage_symbols(port).map(|(_, rate)| rate);
-            match (values.column(stored), rate.and_then(|rate| values.column(rate))) {
-                (Some(x), Some(rate)) => {
-                    // What acts on it for as long as the run lasts makes that much by its rounding, and by what the method misses of it.
-                    let acts = graph.storage_symbols(port).map(|(_, rate)| scales.of(graph, rate));
-                    let mut terms = vec![Term::of(Quantity::Of(stored), 1.0)];
-                    terms.extend(acts.map(|acts| Term::acting(acts, scales.span())));
-                    if let Some(k) = jumps(values.times, x, JUMPED * greatest(x)).iter().position(|j| *j != 0.0) {
-                        let (name, time) = (&element.name, values.times[k]);
-                        unchecked
-                            .push(format!("the impulse that {name} takes at t = {time} s: no effort or flow tells it"));
-                    }
-                    let held = IntegratedQuantity { name: &element.name, x, rate, terms };
-                    held.compare(values, settled, worst, Vec::new);
-                }
-                _ => unchecked.push(format!("the rate of what {} stores: it is not known", element.name)),
+            let (Some(x), Some(rates)) = (values.column(stored), rate.and_then(|rate| values.column(rate))) else {
+                self.unchecked.push(format!("the rate of what {} stores: it is not known", element.name));
+                continue;
+            };
+            // What acts on it for as long as the run lasts makes that much by its rounding, and by what the method misses of it.
+            let acts = rate.map(|rate| Term::acting(scales.of(graph, rate), scales.span()));
+            if let Some(k) = jumps(values, x).iter().position(|j| *j != 0.0) {
+                let (name, time) = (&element.name, values.times[k]);
+                self.unchecked
+                    .push(format!("the impulse that {name} takes at t = {time} s: no effort or flow tells it"));
             }
+            self.compare(&element.name, (x, rates), [Term::of(Quantity::Of(stored), 1.0)].into_iter().chain(acts));
         }
     }
-    for signal in graph.signals.values() {
+
+    fn signal(&mut self, graph: &BondGraph, signal: &IntegratedSignal, scales: &Scales) {
+        let (values, settled) = (self.values, self.settled);
         let Some(x) = values.column(signal.symbol) else {
-            unchecked.push(format!("the rate of {}: its value is not known", signal.name));
-            continue;
+            self.unchecked.push(format!("the rate of {}: its value is not known", signal.name));
+            return;
         };
         if greatest(x) < NOTHING {
-            continue;
+            return;
         }
         let reader = match values.reader(&[signal.rate]) {
             Ok(reader) => reader,
             Err(missing) => {
-                unchecked.push(format!("the rate of {}: {missing} is not known", signal.name));
-                continue;
+                self.unchecked.push(format!("the rate of {}: {missing} is not known", signal.name));
+                return;
             }
         };
         let mut room = Vec::new();
         let mut at = |k: usize| reader.values_in(&mut room, k, &[]).map_or(f64::NAN, |v| v[0]);
-        let rate: Vec<f64> = (0..x.len()).map(&mut at).collect();
-        if rate.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
-            unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
-            continue;
+        let rates: Vec<f64> = (0..x.len()).map(&mut at).collect();
+        if rates.iter().any(|r| r.is_nan()) && !x.iter().any(|x| x.is_nan()) {
+            self.unchecked.push(format!("the rate of {}: it jumps with the state", signal.name));
+            return;
         }
-        let held = IntegratedQuantity {
-            name: &signal.name,
-            x,
-            rate: &rate,
-            terms: vec![Term::of(Quantity::Of(signal.symbol), 1.0)],
-        };
-        held.compare(values, settled, worst, || {
-            // What its rate reads moves it: the terms that its rate has in the middle of the run.
-            let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
-            reads.into_iter().map(|(quantity, weight)| Term::acting(quantity, weight * scales.span())).collect()
-        });
+        // What its rate reads moves it: the terms that its rate has in the middle of the run.
+        let reads = sensitivities(graph, scales, settled, &reader, x.len() / 2, |v| v[0]);
+        let reads = reads.into_iter().map(|(quantity, weight)| Term::acting(quantity, weight * scales.span()));
+        self.compare(&signal.name, (x, &rates), [Term::of(Quantity::Of(signal.symbol), 1.0)].into_iter().chain(reads));
     }
-}
 
-/// Something that changes by its rate.
-struct IntegratedQuantity<'a> {
-    name: &'a str,
-    x: &'a [f64],
-    rate: &'a [f64],
-    terms: Vec<Term>,
-}
-
-impl IntegratedQuantity<'_> {
-    /// Takes note of where it differs most from the integral of its rate; `more` gives further terms of its scale.
-    fn compare(&self, values: &Values, settled: &Settled, worst: &mut Worst, more: impl FnOnce() -> Vec<Term>) {
-        let (times, integral) = (values.times, values.quadrature.integrate(self.rate));
-        let moved = integral.values.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        let mut terms = self.terms.clone();
-        terms.push(Term::of(Quantity::Number, moved));
-        terms.extend(more());
+    /// Takes note of where what is held differs most from the integral of its rates.
+    fn compare(&mut self, name: &str, (x, rates): (&[f64], &[f64]), terms: impl Iterator<Item = Term>) {
+        let Check { values, settled, .. } = *self;
+        let Check { worst, integral, misses, .. } = self;
+        let Some(&begin) = x.first() else { return };
+        values.quadrature.integrate_into(rates, integral);
+        let moved = Term::of(Quantity::Number, greatest(&integral.values));
+        let terms: SmallVec<[Term; 4]> = terms.chain([moved]).collect();
         let scale = settled.scale(&terms);
-        let jumps = jumps(times, self.x, JUMPED * greatest(self.x));
-        let miss = |k: usize| self.x[k] - self.x[0] - jumps[k] - integral.values[k];
-        let stands_out = |k: usize| (scale.relative(miss(k)), scale.relative(integral.uncertainty[k]));
+        misses.clear();
+        misses.extend(x.iter().zip(&integral.values).map(|(x, integral)| x - begin - integral));
+        misses.iter_mut().zip(jumps(values, x)).for_each(|(miss, jump)| *miss -= jump);
+        // What is uncertain adds up.
         worst.leaves_open(scale.relative(integral.uncertainty.last().copied().unwrap_or(0.0)));
+        if are_finite(misses) && worst.is_above(scale.relative(greatest(misses))) {
+            return;
+        }
+        let stands_out = |k: usize| (scale.relative(misses[k]), scale.relative(integral.uncertainty[k]));
         let beyond = |a: usize, b: usize| above(stands_out(b), stands_out(a));
-        let Some(k) = (0..times.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
-        let place = format!("{}: what it holds against its rate", self.name);
-        worst.keep(Raw { miss: miss(k), resolution: integral.uncertainty[k], time: times[k], place, terms }, settled);
+        let Some(k) = (0..misses.len()).reduce(|most, k| if beyond(most, k) { k } else { most }) else { return };
+        let (place, time) = (format!("{name}: what it holds against its rate"), values.times[k]);
+        let raw = Raw { miss: misses[k], resolution: integral.uncertainty[k], time, place, terms: terms.into_vec() };
+        worst.keep(raw, settled);
     }
 }
 
@@ -160,49 +192,84 @@ pub(crate) fn balance(
     unchecked: &mut Vec<String>,
 ) -> Option<Balance> {
     let pseudo = pseudo_parts(graph, scales);
-    let n = values.times.len();
-    let (mut balance, mut uncertainty, mut moved) = (vec![0.0; n], vec![0.0; n], vec![0.0f64; n]);
-    let (mut any, mut held, mut by_impulses) = (false, 0.0f64, Vec::new());
-    let mut gains: Vec<Vec<(String, f64)>> = vec![Vec::new(); n];
-    let mut told = true;
-    let mut at_once = AtOnce::new(n);
-    for port in graph.outer_ports() {
-        let element = &graph.elements[port.element];
-        if pseudo.contains(&scales.part(graph, port)) {
-            continue;
-        }
-        let Some(power) = values.power(port) else {
-            unchecked.push(format!("the energy balance: the power at {} is not known", element.name));
-            return None;
-        };
-        any = true;
-        held = held.max(energy_held(graph, values, port));
-        let own = match stored_by_law(graph, values, port) {
-            Some((energy, gained)) => {
-                if !gained.is_empty() {
-                    let name = graph.port_name(port);
-                    by_impulses.push((name.clone(), gained.iter().map(|(_, gain)| gain).sum()));
-                    gained.into_iter().for_each(|(k, gain)| gains[k].push((name.clone(), gain)));
-                }
-                at_once.stores(&energy);
-                energy
-            }
-            None => {
-                told &= !matches!(element.kind, Kind::Inertance(_) | Kind::Compliance(_));
-                at_once.passes(&power);
-                let through = values.quadrature.integrate(&power);
-                uncertainty.iter_mut().zip(&through.uncertainty).for_each(|(sum, own)| *sum += own);
-                through.values
-            }
-        };
-        for ((balance, moved), own) in balance.iter_mut().zip(&mut moved).zip(&own) {
-            *balance += own;
-            *moved = moved.max(own.abs());
-        }
+    let mut ports = graph.outer_ports();
+    ports.retain(|&port| pseudo.is_empty() || !pseudo.contains(&scales.part(graph, port)));
+    if ports.is_empty() {
+        return None;
     }
-    let moved = moved.into_iter().fold(held, f64::max);
-    let given = if told && takes_only(graph) { given(values.times, &gains) } else { None };
-    any.then_some(Balance { missing: balance, uncertainty, moved, by_impulses, given, at_once })
+    let parts = on_all_cores(&ports, values, |ports, values| Held::by(ports, graph, values));
+    let held = match parts.into_iter().reduce(|all, more| Ok(all?.with(more?))).expect("there are ports") {
+        Ok(held) => held,
+        Err(port) => {
+            let name = &graph.elements[port.element].name;
+            unchecked.push(format!("the energy balance: the power at {name} is not known"));
+            return None;
+        }
+    };
+    let Held { missing, uncertainty, moved, gains, told, at_once } = held;
+    let mut by_impulses: Vec<(String, f64)> = Vec::new();
+    let mut at_samples: Vec<Vec<(String, f64)>> = vec![Vec::new(); values.times.len()];
+    for (port, gained) in gains {
+        let name = graph.port_name(port);
+        by_impulses.push((name.clone(), gained.iter().map(|(_, gain)| gain).sum()));
+        gained.into_iter().for_each(|(k, gain)| at_samples[k].push((name.clone(), gain)));
+    }
+    let given = if told && takes_only(graph) { given(values.times, &at_samples) } else { None };
+    Some(Balance { missing, uncertainty, moved, by_impulses, given, at_once })
+}
+
+/// What some ports hold and pass.
+struct Held {
+    missing: Vec<f64>,
+    uncertainty: Vec<f64>,
+    moved: f64,
+    /// What storages have gained by impulses.
+    gains: Vec<(PortRef, Gains)>,
+    /// Whether the laws of all storages tell what they hold.
+    told: bool,
+    at_once: AtOnce,
+}
+
+impl Held {
+    /// By these ports; the first whose power is not known.
+    fn by(ports: &[PortRef], graph: &BondGraph, values: &Values) -> Result<Held, PortRef> {
+        let n = values.times.len();
+        let (mut missing, mut uncertainty) = (vec![0.0; n], vec![0.0; n]);
+        let (mut moved, mut gains, mut told, mut at_once) = (0.0, Vec::new(), true, AtOnce::new(n));
+        let (mut power, mut integral) = (Vec::new(), Integral::default());
+        for &port in ports {
+            let element = &graph.elements[port.element];
+            values.power(port, &mut power).ok_or(port)?;
+            moved = higher(moved, energy_held(graph, values, port));
+            match stored_by_law(graph, values, port, &mut integral.values) {
+                Some(gained) => {
+                    if !gained.is_empty() {
+                        gains.push((port, gained));
+                    }
+                    at_once.stores(&integral.values);
+                }
+                None => {
+                    told &= !matches!(element.kind, Kind::Inertance(_) | Kind::Compliance(_));
+                    at_once.passes(&power);
+                    values.quadrature.integrate_into(&power, &mut integral);
+                    uncertainty.iter_mut().zip(&integral.uncertainty).for_each(|(sum, own)| *sum += own);
+                }
+            };
+            missing.iter_mut().zip(&integral.values).for_each(|(sum, own)| *sum += own);
+            moved = higher(moved, greatest(&integral.values));
+        }
+        Ok(Held { missing, uncertainty, moved, gains, told, at_once })
+    }
+
+    /// By these ports and others.
+    fn with(mut self, more: Held) -> Held {
+        let add = |all: &mut Vec<f64>, more: Vec<f64>| all.iter_mut().zip(more).for_each(|(sum, own)| *sum += own);
+        add(&mut self.missing, more.missing);
+        add(&mut self.uncertainty, more.uncertainty);
+        self.gains.extend(more.gains);
+        let at_once = self.at_once.with(more.at_once);
+        Held { moved: higher(self.moved, more.moved), told: self.told && more.told, at_once, ..self }
+    }
 }
 
 /// The connected parts that have bonds without power.
@@ -265,14 +332,18 @@ fn energy_held(graph: &BondGraph, values: &Values, port: PortRef) -> f64 {
     let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &graph.elements[port.element].kind else { return 0.0 };
     let z = graph.storage_symbols(port).and_then(|(z, _)| values.column(z));
     match (z, values.column(storage.stored[port.port as usize])) {
-        (Some(z), Some(x)) => z.iter().zip(x).fold(0.0, |most, (z, x)| most.max((z * x).abs())),
+        (Some(z), Some(x)) => greatest_product(z, x),
         _ => 0.0,
     }
 }
 
 /// Jumps of what is held, added up, sample by sample: at a time given twice it may change by an impulse, which no rate tells.
-/// What changes by less than `least` there has not jumped.
-fn jumps(times: &[f64], x: &[f64], least: f64) -> Vec<f64> {
+/// None where no time is given twice.
+fn jumps(values: &Values, x: &[f64]) -> Vec<f64> {
+    if !values.quadrature.has_jumps() {
+        return Vec::new();
+    }
+    let (times, least) = (values.times, JUMPED * greatest(x));
     let mut sum = vec![0.0; x.len()];
     for k in 1..x.len() {
         let change = if times[k] <= times[k - 1] { x[k] - x[k - 1] } else { 0.0 };
@@ -281,24 +352,20 @@ fn jumps(times: &[f64], x: &[f64], least: f64) -> Vec<f64> {
     sum
 }
 
-/// The greatest magnitude.
-fn greatest(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |most, x| most.max(x.abs()))
-}
-
 /// Part of what it holds at most by which a stored quantity has to change at once to have jumped.
 const JUMPED: f64 = 1e-9;
 
 /// What is gained at samples, in J.
 type Gains = Vec<(usize, f64)>;
 
-/// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample, without what it
-/// has gained by impulses, and that, each with its sample; `None` if its law is no function of its own stored quantity and parameters, or reads what is not known.
-fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(Vec<f64>, Gains)> {
+/// Energy that a one-port storage has taken up since the start, `∫ z dX` along its law, sample by sample in `energy`, without
+/// what it has gained by impulses, and that, each with its sample; `None` if its law is no function of its own stored quantity and
+/// parameters, or reads what is not known.
+fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef, energy: &mut Vec<f64>) -> Option<Gains> {
     let element = &graph.elements[port.element];
     let (Kind::Inertance(storage) | Kind::Compliance(storage)) = &element.kind else { return None };
     let (StorageLaw::Integral(law) | StorageLaw::Known { law, .. }) = *storage.laws.first()? else { return None };
-    if storage.laws.len() != 1 || !outside(graph, port.element, element, storage).is_empty() {
+    if storage.laws.len() != 1 || outside(graph, port.element, element, storage).next().is_some() {
         return None;
     }
     let (own, x) = (storage.stored[0], values.column(storage.stored[0])?);
@@ -306,24 +373,28 @@ fn stored_by_law(graph: &BondGraph, values: &Values, port: PortRef) -> Option<(V
         return None;
     }
     if let Some(line) = values.line(law) {
-        return Some(stored_along(values.times, x, |x| line.where_all_are(x)));
+        return Some(stored_along(values, x, |x| line.where_all_are(x), energy));
     }
     let law = EvaluationOrder::new(&graph.exprs, &[law]);
     let numbers: Vec<Option<f64>> = law.symbols().iter().map(|&s| values.parameter(s).filter(|_| s != own)).collect();
     let mut room = Vec::new();
-    Some(stored_along(values.times, x, |x| law.values_in(&mut room, |k| [numbers[k].unwrap_or(x)])[0][0]))
+    let z = |x| law.values_in(&mut room, |k| [numbers[k].unwrap_or(x)])[0][0];
+    Some(stored_along(values, x, z, energy))
 }
 
 /// The same for a law `z` of what is stored, which is `x` at the samples.
-fn stored_along(times: &[f64], x: &[f64], mut z: impl FnMut(f64) -> f64) -> (Vec<f64>, Gains) {
+fn stored_along(values: &Values, x: &[f64], mut z: impl FnMut(f64) -> f64, energy: &mut Vec<f64>) -> Gains {
     // What an impulse gives or takes is no power of any sample.
-    let jumps = jumps(times, x, JUMPED * greatest(x));
-    let (mut energy, mut gained) = (vec![0.0; x.len()], Vec::new());
+    let jumps = jumps(values, x);
+    let (mut held, mut gained) = (0.0, Vec::new());
+    energy.clear();
+    energy.extend((!x.is_empty()).then_some(held));
     for k in 1..x.len() {
         let change = gauss(x[k - 1], x[k], &mut z);
-        let by_impulse = jumps[k] != jumps[k - 1];
+        let by_impulse = !jumps.is_empty() && jumps[k] != jumps[k - 1];
         gained.extend(by_impulse.then_some((k, change)));
-        energy[k] = energy[k - 1] + if by_impulse { 0.0 } else { change };
+        held += if by_impulse { 0.0 } else { change };
+        energy.push(held);
     }
-    (energy, gained)
+    gained
 }

@@ -1,26 +1,30 @@
 //! Every law of every junction and element, at every sample.
 
 use crate::constraints::Share;
+use crate::on_all_cores::on_all_cores;
 use crate::scales::{Quantity, Scale, Scales, Settled, Term};
 use crate::terms::Terms;
 use crate::values::{Line, Reader, Values};
 use crate::worst::{Raw, Worst};
 use halfarrow_compiler::algebra::{Expr, Exprs, Node, ONE, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Element, Kind, ResistorLaw, StorageLaw, TwoPortRow};
-use rayon::prelude::*;
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Columns with signs.
+type Signed<'a> = SmallVec<[(f64, &'a [f64]); 3]>;
 
 /// A law in values: what stands against what, and the quantity that it is about.
 enum Law<'a> {
     /// Signed columns sum to zero.
-    Sum { terms: Vec<(f64, &'a [f64])>, what: &'static str, of: Quantity },
+    Sum { terms: Signed<'a>, what: &'static str, of: Quantity },
     /// A recorded column is a sum of numbers times others.
     Line { left: &'a [f64], right: Line<'a>, what: &'static str, of: Quantity },
     /// A recorded column has the value of an expression.
     Value { left: &'a [f64], right: Expr, what: &'static str, of: Quantity },
     /// Signed columns sum to an expression times another.
     Product {
-        left: Vec<(f64, &'a [f64])>,
+        left: Signed<'a>,
         factor: Expr,
         /// What they are multiplied by themselves.
         divisor: Option<Expr>,
@@ -81,34 +85,6 @@ fn fixed(graph: &BondGraph) -> Vec<&Element> {
 /// Laws with expressions that are read together at most: what bounds the memory of large models.
 const TOGETHER: usize = 4096;
 
-/// So many elements are looked at in one thread, whatever the machine: what is found does not depend on it.
-const BY_ONE: usize = 1 << 13;
-
-/// What `look` finds of the elements, some thousands at a time, in their order.
-fn on_all_cores<'a, T: Send>(
-    elements: &[&Element],
-    values: &Values<'a>,
-    look: impl Fn(&[&Element], &Values<'a>) -> T + Sync,
-) -> Vec<T> {
-    if elements.len() <= BY_ONE {
-        return vec![look(elements, values)];
-    }
-    let parts: Vec<_> = elements.chunks(BY_ONE).map(|part| (part, values.beside_these())).collect();
-    parts.into_par_iter().map(|(part, values)| look(part, &values)).collect()
-}
-
-/// Does two things that have nothing to do with each other, of large models in two threads.
-pub(crate) fn both_at_once<A: Send, B: Send>(
-    graph: &BondGraph,
-    one: impl FnOnce() -> A + Send,
-    other: impl FnOnce() -> B + Send,
-) -> (A, B) {
-    match graph.elements.len() <= BY_ONE {
-        true => (one(), other()),
-        false => rayon::join(one, other),
-    }
-}
-
 /// Takes note of the law whose miss is greatest.
 pub(crate) fn residual(
     (graph, shares, quotients): (&BondGraph, &[Share], &Quotients),
@@ -117,7 +93,7 @@ pub(crate) fn residual(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
+    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
     for (name, symbol, left, right) in values.same() {
         let of = scales.of(graph, symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
@@ -125,7 +101,7 @@ pub(crate) fn residual(
     let Check { worst: names, laws: mut before, .. } = check;
     worst.absorb(0, names, settled);
     let of_elements = on_all_cores(&fixed(graph), values, |elements, values| {
-        let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
+        let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
         let unchecked = check.elements(elements, quotients);
         (check.worst, check.laws, unchecked)
     });
@@ -134,7 +110,7 @@ pub(crate) fn residual(
         before += laws;
         unchecked.extend(missing);
     }
-    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0 };
+    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
     let mut written = Vec::new();
     for share in shares {
         let name = &graph.elements[share.junction].name;
@@ -185,10 +161,10 @@ fn links_of(
 ) -> Vec<Link> {
     let mut links = Vec::new();
     let middle = values.times.len() / 2;
+    let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
     for element in elements {
-        let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         laws.of(element);
-        for law in laws.laws {
+        for law in laws.laws.drain(..) {
             match law {
                 Law::Line { right, of, .. } => {
                     links.push(Link { of, from: Quantity::Number, weight: right.magnitude(middle), straight: false });
@@ -386,21 +362,25 @@ impl<'a> Laws<'a, '_> {
     fn common(&mut self, element: &Element, flow: bool) {
         let what = if flow { "its common flow" } else { "its common effort" };
         let of = self.scales.of_bond(element.ports[0].bond, flow);
-        let columns: Vec<&[f64]> = element.ports.iter().filter_map(|p| self.column(p.bond, flow)).collect();
-        // What is recorded once for all of them is common without saying.
-        for pair in columns.windows(2).filter(|pair| !std::ptr::eq(pair[0], pair[1])) {
-            self.laws.push(Law::Sum { terms: vec![(1.0, pair[0]), (-1.0, pair[1])], what, of });
+        let mut before: Option<&[f64]> = None;
+        for port in &element.ports {
+            let Some(own) = self.column(port.bond, flow) else { continue };
+            // What is recorded once for all of them is common without saying.
+            if let Some(other) = before.filter(|other| !std::ptr::eq(*other, own)) {
+                self.laws.push(Law::Sum { terms: [(1.0, other), (-1.0, own)].into_iter().collect(), what, of });
+            }
+            before = Some(own);
         }
     }
 
     fn sum(&mut self, element: &Element, flow: bool) {
         let what = if flow { "the sum of its flows" } else { "the sum of its efforts" };
         let sign = |inward: bool| if inward { 1.0 } else { -1.0 };
-        let terms: Vec<Option<(f64, &[f64])>> =
-            element.ports.iter().map(|p| Some((sign(p.inward), self.column(p.bond, flow)?))).collect();
-        if terms.iter().all(Option::is_some) {
+        let known = element.ports.iter().filter_map(|p| Some((sign(p.inward), self.column(p.bond, flow)?)));
+        let terms: Signed = known.collect();
+        if terms.len() == element.ports.len() {
             let of = self.scales.of_bond(element.ports[0].bond, flow);
-            self.laws.push(Law::Sum { terms: terms.into_iter().flatten().collect(), what, of });
+            self.laws.push(Law::Sum { terms, what, of });
         }
     }
 
@@ -422,7 +402,7 @@ impl<'a> Laws<'a, '_> {
     fn vanishes(&mut self, bond: BondId, flow: bool, what: &'static str) {
         if let Some(column) = self.column(bond, flow) {
             let of = self.scales.of_bond(bond, flow);
-            self.laws.push(Law::Sum { terms: vec![(1.0, column)], what, of });
+            self.laws.push(Law::Sum { terms: [(1.0, column)].into_iter().collect(), what, of });
         }
     }
 
@@ -466,7 +446,7 @@ impl<'a> Laws<'a, '_> {
             if let (Some(left), Some(right)) = (self.column(left, left_flow), self.column(right, right_flow)) {
                 let quotient = self.quotients.get(&factor).map(|&(over, under)| (over, Some(under)));
                 let (factor, divisor) = quotient.unwrap_or((factor, None));
-                let left = vec![(1.0, left)];
+                let left = [(1.0, left)].into_iter().collect();
                 self.laws.push(Law::Product { left, factor, divisor, right: (right, other), what, of });
             }
         }
@@ -538,6 +518,8 @@ struct Check<'a, 'b> {
     worst: Worst,
     /// How many laws there were.
     laws: usize,
+    /// By how much one is missed, sample by sample.
+    row: Vec<f64>,
 }
 
 impl<'a, 'b> Check<'a, 'b> {
@@ -545,13 +527,13 @@ impl<'a, 'b> Check<'a, 'b> {
     fn elements(&mut self, elements: &[&'b Element], quotients: &Quotients) -> Vec<String> {
         let (mut unchecked, mut written) = (Vec::new(), Vec::new());
         let Check { graph, values, scales, .. } = *self;
+        let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
         for &element in elements {
-            let mut laws = Laws { graph, values, scales, quotients, laws: Vec::new(), missing: false };
             laws.of(element);
-            if laws.missing {
+            if std::mem::take(&mut laws.missing) {
                 unchecked.push(format!("laws of {}: not all of its efforts and flows are known", element.name));
             }
-            for law in laws.laws {
+            for law in laws.laws.drain(..) {
                 if let Err(missing) = self.law(&element.name, law, &mut written) {
                     unchecked.push(format!("a law of {}: {missing} is not known", element.name));
                 }
@@ -600,27 +582,32 @@ impl<'a, 'b> Check<'a, 'b> {
         self.laws += 1;
         let natural = Term::of(of, 1.0);
         let scale = self.settled.scale(&[natural]);
-        for (k, &time) in self.values.times.iter().enumerate() {
-            let miss = terms.iter().map(|(sign, column)| sign * column[k]).sum();
-            self.worst.note_of(self.laws, miss, scale, self.settled, || raw(miss, time, name, what, vec![natural]));
+        let Check { values, settled, .. } = *self;
+        let row = &mut self.row;
+        row.clear();
+        row.resize(values.times.len(), -0.0);
+        for &(sign, column) in terms {
+            row.iter_mut().zip(column).for_each(|(sum, value)| *sum += sign * value);
         }
+        let raw = |k: usize, miss: f64| raw(miss, values.times[k], name, what, vec![natural]);
+        self.worst.note_row(self.laws, row, scale, settled, raw);
     }
 
     /// A column that is a sum of numbers times others.
     fn line(&mut self, name: &str, (left, right): (&[f64], &Line), what: &str, of: Quantity) {
         self.laws += 1;
-        let (graph, scales, settled) = (self.graph, self.scales, self.settled);
+        let Check { graph, values, scales, settled, .. } = *self;
         let natural = Term::of(of, 1.0);
         let scale = settled.scale(&[natural]);
-        for (k, &time) in self.values.times.iter().enumerate() {
-            let miss = left[k] - right.at(k);
-            self.worst.note_of(self.laws, miss, scale, settled, || {
-                let slopes = slopes_of(right, graph, (scales, settled));
-                let terms = [natural, Term::beside(Quantity::Number, right.magnitude(k))].into_iter();
-                let terms = terms.chain(slopes.map(|(from, slope)| Term::beside(from, slope))).collect();
-                raw(miss, time, name, what, terms)
-            });
-        }
+        let row = &mut self.row;
+        right.values(values.times.len(), row);
+        row.iter_mut().zip(left).for_each(|(value, left)| *value = left - *value);
+        self.worst.note_row(self.laws, row, scale, settled, |k, miss| {
+            let slopes = slopes_of(right, graph, (scales, settled));
+            let terms = [natural, Term::beside(Quantity::Number, right.magnitude(k))].into_iter();
+            let terms = terms.chain(slopes.map(|(from, slope)| Term::beside(from, slope))).collect();
+            raw(miss, values.times[k], name, what, terms)
+        });
     }
 
     /// Laws with expressions: what they read has much in common.

@@ -19,7 +19,9 @@ mod at_once;
 mod constraints;
 mod drift;
 mod energy;
+mod lanes;
 mod laws;
+mod on_all_cores;
 mod power;
 mod quadrature;
 mod regions;
@@ -161,9 +163,11 @@ impl Auditor {
             relations = drift::relations(&graph, &mut x);
             graph = Arc::new(graph.with_exprs(x));
         }
+        let (columns, scales) =
+            on_all_cores::beside(&graph, || values::Columns::new(&graph, column_of), || scales::Scales::new(&graph));
         Auditor {
-            columns: values::Columns::new(&graph, column_of),
-            scales: scales::Scales::new(&graph),
+            columns,
+            scales,
             graph,
             shares,
             quotients,
@@ -209,7 +213,7 @@ impl Auditor {
             energy::rates(graph, &beside, scales, rates, &mut unchecked);
             unchecked
         };
-        let (missing, also) = laws::both_at_once(graph, of_laws, of_flows);
+        let (missing, also) = on_all_cores::both_at_once(graph, of_laws, of_flows);
         unchecked.extend(missing.into_iter().chain(also));
         balance.iter().for_each(|balance| balance.compare(run.times, &settled, &mut self.energy));
         balance.iter().for_each(|balance| balance.compare_at_once(run.times, &settled, &mut self.at_once));

@@ -4,6 +4,7 @@
 const APART: f64 = 4.0;
 
 /// Integrals from the first sample to each, and what they are uncertain by.
+#[derive(Default)]
 pub(crate) struct Integral {
     pub values: Vec<f64>,
     pub uncertainty: Vec<f64>,
@@ -52,14 +53,31 @@ impl Quadrature {
 
     /// Integrates values at these times.
     pub fn integrate(&self, rates: &[f64]) -> Integral {
-        let n = rates.len();
-        let mut integral = Integral { values: vec![0.0; n], uncertainty: vec![0.0; n] };
-        for (k, interval) in self.intervals.iter().enumerate() {
-            let (step, doubt) = interval.integrate(rates);
-            integral.values[k + 1] = integral.values[k] + step;
-            integral.uncertainty[k + 1] = integral.uncertainty[k] + doubt;
-        }
+        let mut integral = Integral::default();
+        self.integrate_into(rates, &mut integral);
         integral
+    }
+
+    /// The same in memory that is used again.
+    pub fn integrate_into(&self, rates: &[f64], integral: &mut Integral) {
+        let Integral { values, uncertainty } = integral;
+        values.clear();
+        uncertainty.clear();
+        let (mut value, mut doubt) = (0.0, 0.0);
+        let begun = !rates.is_empty();
+        values.extend(begun.then_some(value));
+        uncertainty.extend(begun.then_some(doubt));
+        for interval in &self.intervals {
+            let (step, doubtful) = interval.integrate(rates);
+            (value, doubt) = (value + step, doubt + doubtful);
+            values.push(value);
+            uncertainty.push(doubt);
+        }
+    }
+
+    /// Whether a time is given twice.
+    pub fn has_jumps(&self) -> bool {
+        self.intervals.iter().any(|interval| interval.length == 0.0)
     }
 }
 
@@ -93,11 +111,17 @@ impl Interval {
 
     /// The integral, and how much of it is uncertain.
     fn integrate(&self, rates: &[f64]) -> (f64, f64) {
+        if self.length == 0.0 {
+            return (0.0, 0.0);
+        }
         let first = rates[self.low];
-        let others = &rates[self.low + 1..];
-        let sum = |weights: &Weights| weights.iter().zip(others).map(|(w, r)| w * (r - first)).sum::<f64>();
+        let mut others = [0.0; MOST - 1];
+        others.iter_mut().zip(&rates[self.low + 1..]).for_each(|(other, rate)| *other = rate - first);
+        let sum = |w: &Weights| {
+            w[0] * others[0] + w[1] * others[1] + (w[2] * others[2] + w[3] * others[3]) + w[4] * others[4]
+        };
         let doubt = self.doubts.iter().map(|weights| sum(weights).abs()).fold(0.0, f64::max);
-        if self.length == 0.0 { (0.0, 0.0) } else { (self.length * first + sum(&self.fine), doubt) }
+        (self.length * first + sum(&self.fine), doubt)
     }
 }
 

@@ -5,10 +5,12 @@
 //! its own: what stands *beside* it, its kind elsewhere, what moves it during the run, the terms of its law, tells how much
 //! of a miss is rounding, and how great it counts as at least.
 
+use crate::lanes::{greatest, higher};
 use crate::laws::Link;
+use crate::on_all_cores::on_all_cores;
 use crate::regions::Classes;
 use crate::values::Values;
-use halfarrow_compiler::algebra::Symbol;
+use halfarrow_compiler::algebra::{Symbol, ZERO};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, PortRef};
 use halfarrow_compiler::unit::Dimension;
 use std::collections::BTreeMap;
@@ -286,25 +288,29 @@ impl Scales {
         if let (Some(&first), Some(&last)) = (values.times.first(), values.times.last()) {
             self.span = last - *self.begun.get_or_insert(first);
         }
+        let sizes = sizes_of(values);
         let mut turned = Sizes::of(&self.places);
-        for bond in graph.bonds.ids() {
-            for flow in [false, true] {
-                let column = if flow { values.flow(bond) } else { values.effort(bond) }.unwrap_or_default();
-                let place = self.places.at(self.of_bond(bond, flow));
-                self.seen.raise(place, greatest(column));
-                turned.raise(place, turnover(values.times, column));
+        for (id, bond) in graph.bonds.iter() {
+            for (flow, symbol) in [(false, bond.effort), (true, bond.flow)] {
+                let Some(column) = values.place(symbol) else { continue };
+                let place = self.places.at(self.of_bond(id, flow));
+                let (greatest, turnover) = sizes[column];
+                self.seen.raise(place, greatest);
+                turned.raise(place, turnover);
             }
         }
         self.turnovers.0.iter_mut().zip(&turned.0).for_each(|(all, more)| *all += more);
-        for (symbol, column) in values.columns() {
-            if let quantity @ Quantity::Of(_) = self.of(graph, symbol) {
-                self.note(quantity, greatest(column));
+        for symbol in (0..self.places.of.len() as u32).map(Symbol) {
+            if let (Some(place), Some(column)) = (self.places.find(Quantity::Of(symbol)), values.place(symbol)) {
+                self.seen.raise(place, sizes[column].0);
             }
         }
         self.absorb_given(graph, values);
-        for port in graph.outer_ports() {
-            self.note(self.power(graph, port), values.greatest_power(port));
-        }
+        let ports = graph.outer_ports();
+        let powers = on_all_cores(&ports, values, |ports, values| {
+            ports.iter().map(|&port| values.greatest_power(port)).collect::<Vec<f64>>()
+        });
+        ports.iter().zip(powers.iter().flatten()).for_each(|(&port, &power)| self.note(self.power(graph, port), power));
     }
 
     /// Takes note of the start values that the model gives: they tell what is great where a run begins at rest.
@@ -313,7 +319,7 @@ impl Scales {
             Kind::Inertance(storage) | Kind::Compliance(storage) => Some(&storage.initial),
             _ => None,
         });
-        for initial in starts.flatten() {
+        for initial in starts.flatten().filter(|initial| initial.value != ZERO) {
             let value = graph.exprs.eval(initial.value, &mut |s| values.parameter(s).unwrap_or(f64::NAN)).abs();
             if value.is_finite() {
                 let place = self.places.at(self.of(graph, initial.symbol));
@@ -557,13 +563,32 @@ fn sort_of_stored(graph: &BondGraph, port: PortRef, stored: Symbol) -> Sort {
 }
 
 /// The integral of the magnitude, from below: of what grows without bound the samples tell no more.
-fn turnover(times: &[f64], column: &[f64]) -> f64 {
-    let pieces = times.windows(2).zip(column.windows(2));
-    pieces.map(|(t, v)| (t[1] - t[0]) * v[0].abs().min(v[1].abs())).sum()
+fn turnover(steps: &[f64], column: &[f64]) -> f64 {
+    const LANES: usize = 4;
+    let lower = |a: f64, b: f64| if b < a { b } else { a };
+    let piece = |step: f64, from: f64, to: f64| step * lower(from.abs(), to.abs());
+    let behind = column.get(1..).unwrap_or_default();
+    let ((steps, last), (from, _), (to, _)) =
+        (steps.as_chunks::<LANES>(), column.as_chunks::<LANES>(), behind.as_chunks::<LANES>());
+    let mut sums = [0.0; LANES];
+    for (step, (from, to)) in steps.iter().zip(from.iter().zip(to)) {
+        for (k, sum) in sums.iter_mut().enumerate() {
+            *sum += piece(step[k], from[k], to[k]);
+        }
+    }
+    let done = LANES * steps.len();
+    let rest = last.iter().zip(column.iter().zip(behind).skip(done)).map(|(step, (from, to))| piece(*step, *from, *to));
+    sums.into_iter().chain(rest).sum()
 }
 
-fn greatest(column: &[f64]) -> f64 {
-    column.iter().fold(0.0, |most, v| most.max(v.abs()))
+/// The greatest magnitude of each column, and its turnover.
+fn sizes_of(values: &Values) -> Vec<(f64, f64)> {
+    let steps: Vec<f64> = values.times.windows(2).map(|t| t[1] - t[0]).collect();
+    let columns = values.recorded_columns();
+    let sizes = |columns: &[&[f64]], _: &Values| {
+        columns.iter().map(|column| (greatest(column), turnover(&steps, column))).collect::<Vec<_>>()
+    };
+    on_all_cores(columns, values, sizes).concat()
 }
 
 /// How great a quantity is, and what stands beside it.
@@ -630,9 +655,14 @@ impl Settled {
 }
 
 impl Scale {
+    /// The scale of what has the terms of both.
+    pub fn or(self, other: Scale) -> Scale {
+        Scale { own: higher(self.own, other.own), beside: higher(self.beside, other.beside) }
+    }
+
     /// The scale of what also stands beside so much of a quantity whose scale alone is `other`.
     pub fn beside(self, weight: f64, other: Scale) -> Scale {
-        Scale { own: self.own.max(FLOOR * weight * other.own), beside: self.beside.max(weight * other.beside) }
+        Scale { own: higher(self.own, FLOOR * weight * other.own), beside: higher(self.beside, weight * other.beside) }
     }
 
     /// The miss as a part of what is there: what rounding may make of it as a part of what stands beside it.

@@ -1,10 +1,12 @@
 //! Recorded values by symbol.
 
 use crate::Run;
+use crate::lanes::greatest_product;
 use crate::quadrature::Quadrature;
 use halfarrow_compiler::algebra::{EvaluationOrder, Expr, Exprs, Function, Node, Symbol};
 use halfarrow_compiler::bond_graph::{BondGraph, BondId, Kind, Meaning, Port, PortRef};
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 use std::cell::{OnceCell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -151,7 +153,7 @@ pub(crate) struct Values<'a> {
     of: &'a Columns,
     columns: &'a [&'a [f64]],
     names: &'a [Arc<str>],
-    parameters: Arc<BTreeMap<Symbol, f64>>,
+    parameters: Arc<FxHashMap<Symbol, f64>>,
     /// Borders in expressions, as far as they are known.
     borders: RefCell<FxHashMap<Expr, Borders>>,
     /// Values of expressions that parameters alone tell, as far as they were asked for; `None` of those that read more.
@@ -208,27 +210,38 @@ impl<'a> Values<'a> {
     }
 
     pub fn column(&self, symbol: Symbol) -> Option<&'a [f64]> {
-        let at = *self.of.of.get(symbol.0 as usize)?;
-        (at != NONE).then(|| self.columns[at as usize])
+        self.place(symbol).map(|at| self.columns[at])
     }
 
-    /// Power into the element at a port, sample by sample.
-    pub fn power(&self, port: PortRef) -> Option<Vec<f64>> {
+    /// Which of the columns has the values of a symbol.
+    pub fn place(&self, symbol: Symbol) -> Option<usize> {
+        self.of.of.get(symbol.0 as usize).filter(|&&at| at != NONE).map(|&at| at as usize)
+    }
+
+    /// Everything that is recorded.
+    pub fn recorded_columns(&self) -> &'a [&'a [f64]] {
+        self.columns
+    }
+
+    /// Power into the element at a port, sample by sample, in `power`; `None` where it is not known.
+    pub fn power(&self, port: PortRef, power: &mut Vec<f64>) -> Option<()> {
         let at = &self.graph.elements[port.element].ports[port.port as usize];
         let sign = if at.inward { 1.0 } else { -1.0 };
+        power.clear();
         match (self.effort(at.bond), self.flow(at.bond)) {
-            (Some(e), Some(f)) => Some(e.iter().zip(f).map(|(e, f)| sign * e * f).collect()),
+            (Some(e), Some(f)) => power.extend(e.iter().zip(f).map(|(e, f)| sign * e * f)),
             // An undetermined effort does no work where nothing flows, and the other way round.
-            (None, Some(zero)) | (Some(zero), None) if zero.iter().all(|&v| v == 0.0) => Some(zero.to_vec()),
-            _ => None,
+            (None, Some(zero)) | (Some(zero), None) if zero.iter().all(|&v| v == 0.0) => power.extend_from_slice(zero),
+            _ => return None,
         }
+        Some(())
     }
 
     /// The greatest power at a port, whichever way; 0 where it is not known.
     pub fn greatest_power(&self, port: PortRef) -> f64 {
         let bond = self.graph.bond_of(port);
         let (Some(e), Some(f)) = (self.effort(bond), self.flow(bond)) else { return 0.0 };
-        e.iter().zip(f).fold(0.0, |most, (e, f)| most.max((e * f).abs()))
+        greatest_product(e, f)
     }
 
     /// An expression that is written as a sum of numbers times different recorded variables.
@@ -238,7 +251,7 @@ impl<'a> Values<'a> {
             Node::Add(terms) => &terms[..],
             _ => &[e][..],
         };
-        let terms: Vec<LineTerm> = terms.iter().map(|&term| self.line_term(term)).collect::<Option<_>>()?;
+        let terms: SmallVec<[LineTerm; 2]> = terms.iter().map(|&term| self.line_term(term)).collect::<Option<_>>()?;
         let moves = |k: usize| terms[k].moved.map(|(symbol, _)| symbol);
         let repeats = |k: usize| moves(k).is_some() && (0..k).any(|other| moves(other) == moves(k));
         (!(1..terms.len()).any(repeats)).then_some(Line { terms })
@@ -250,7 +263,7 @@ impl<'a> Values<'a> {
             Node::Mul(factors) => &factors[..],
             _ => &[term][..],
         };
-        let mut found = LineTerm { before: 1.0, moved: None, behind: Vec::new() };
+        let mut found = LineTerm { before: 1.0, moved: None, behind: SmallVec::new() };
         for &factor in factors {
             match (self.number(factor), x.node(factor)) {
                 (Some(number), _) if found.moved.is_none() => found.before *= number,
@@ -266,8 +279,10 @@ impl<'a> Values<'a> {
 
     /// The value of what parameters alone tell.
     fn number(&self, e: Expr) -> Option<f64> {
-        if let Node::Symbol(symbol) = self.graph.exprs.node(e) {
-            return self.parameter(*symbol);
+        match self.graph.exprs.node(e) {
+            Node::Symbol(symbol) => return self.parameter(*symbol),
+            Node::Number(number) => return Some(number.to_f64()),
+            _ => {}
         }
         *self.numbers.borrow_mut().entry(e).or_insert_with(|| {
             let order = EvaluationOrder::new(&self.graph.exprs, &[e]);
@@ -349,12 +364,6 @@ impl<'a> Values<'a> {
     /// The expressions of the graph.
     pub fn exprs(&self) -> &'a Exprs {
         &self.graph.exprs
-    }
-
-    /// All columns by symbol.
-    pub fn columns(&self) -> impl Iterator<Item = (Symbol, &'a [f64])> + '_ {
-        let symbols = (0..self.of.of.len() as u32).map(Symbol);
-        symbols.filter_map(|symbol| Some((symbol, self.column(symbol)?)))
     }
 
     /// On which side of a jump a sample stands. The start is the far side of one, and so is a single sample at the time
@@ -443,14 +452,14 @@ impl<'a> Values<'a> {
 
 /// A sum of numbers times different recorded variables.
 pub(crate) struct Line<'a> {
-    terms: Vec<LineTerm<'a>>,
+    terms: SmallVec<[LineTerm<'a>; 2]>,
 }
 
 /// A number times a recorded variable, or alone, as factors in the order in which they are written.
 struct LineTerm<'a> {
     before: f64,
     moved: Option<(Symbol, &'a [f64])>,
-    behind: Vec<f64>,
+    behind: SmallVec<[f64; 2]>,
 }
 
 impl LineTerm<'_> {
@@ -462,6 +471,14 @@ impl LineTerm<'_> {
         self.with(|column| column[sample])
     }
 
+    /// Adds its values to those in the row, sample by sample.
+    fn add_to(&self, row: &mut [f64]) {
+        match self.moved {
+            None => row.iter_mut().for_each(|sum| *sum += self.before),
+            Some((_, column)) => row.iter_mut().zip(column).for_each(|(sum, &moved)| *sum += self.times(moved)),
+        }
+    }
+
     /// Its value where the variable has this one of its column.
     fn with(&self, of: impl Fn(&[f64]) -> f64) -> f64 {
         self.moved.map_or(self.before, |(_, column)| self.times(of(column)))
@@ -469,9 +486,11 @@ impl LineTerm<'_> {
 }
 
 impl Line<'_> {
-    /// Its value at a sample, to the bits of a [`Reader`].
-    pub fn at(&self, sample: usize) -> f64 {
-        self.terms.iter().fold(-0.0, |sum, term| sum + term.at(sample))
+    /// Its values at all samples, to the bits of a [`Reader`], in `row`.
+    pub fn values(&self, samples: usize, row: &mut Vec<f64>) {
+        row.clear();
+        row.resize(samples, -0.0);
+        self.terms.iter().for_each(|term| term.add_to(row));
     }
 
     /// Its value where all variables in it have this one.

@@ -1,6 +1,7 @@
 //! The greatest miss of a kind, in numbers whose scale is known only when the run is over.
 
 use crate::Finding;
+use crate::lanes::{are_finite, greatest};
 use crate::scales::{Scale, Settled, Term};
 
 /// A miss before it is measured: what it counts relative to may still grow.
@@ -47,11 +48,35 @@ impl Worst {
 
     /// The same for a law of this number: of equal misses that of the first law stays, whichever is seen first.
     pub fn note_of(&mut self, law: usize, miss: f64, scale: Scale, settled: &Settled, raw: impl FnOnce() -> Raw) {
-        let value = scale.relative(miss);
-        let above = |now: &Finding| value > now.value || value.is_nan() || (value == now.value && law < self.law);
-        if self.now.as_ref().is_none_or(|(now, _)| !now.value.is_nan() && above(now)) {
+        if self.stands_out(law, scale.relative(miss)) {
             self.keep_of(law, raw(), settled);
         }
+    }
+
+    /// The same for misses of a law at all samples, relative to one scale.
+    pub fn note_row(
+        &mut self,
+        law: usize,
+        misses: &[f64],
+        scale: Scale,
+        settled: &Settled,
+        raw: impl Fn(usize, f64) -> Raw,
+    ) {
+        if are_finite(misses) && !self.stands_out(law, scale.relative(greatest(misses))) {
+            return;
+        }
+        misses.iter().enumerate().for_each(|(k, &miss)| self.note_of(law, miss, scale, settled, || raw(k, miss)));
+    }
+
+    /// Whether a miss of a law would stand out.
+    fn stands_out(&self, law: usize, value: f64) -> bool {
+        let above = |now: &Finding| value > now.value || value.is_nan() || (value == now.value && law < self.law);
+        self.now.as_ref().is_none_or(|(now, _)| !now.value.is_nan() && above(now))
+    }
+
+    /// Whether what is kept stands out more than any miss up to this one, whatever the samples resolve of it.
+    pub fn is_above(&self, value: f64) -> bool {
+        self.now.as_ref().is_some_and(|(now, _)| value < excess(pair(now)))
     }
 
     /// Keeps a miss if it stands out most above what the samples resolve.
@@ -103,13 +128,17 @@ impl Worst {
     }
 }
 
+/// By how much a value exceeds what the samples resolve of it; nothing but for rounding is nothing.
+fn excess((value, resolution): (f64, f64)) -> f64 {
+    Some(value - resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0)
+}
+
 fn pair(finding: &Finding) -> (f64, f64) {
     (finding.value, finding.resolution)
 }
 
 /// Whether a value with what the samples resolve of it stands out more than another; what is not a number is never right.
 pub(crate) fn above(new: (f64, f64), old: (f64, f64)) -> bool {
-    let excess = |(value, resolution): (f64, f64)| Some(value - resolution).filter(|e| *e > ROUNDING).unwrap_or(0.0);
     match (new.0.is_nan(), old.0.is_nan()) {
         (_, true) => false,
         (true, false) => true,

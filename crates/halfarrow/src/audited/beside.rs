@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
 use halfarrow_audit::{Auditor, Run};
+use rayon::prelude::*;
 
 /// A part of a run, as it was recorded.
 pub struct Part {
@@ -100,15 +101,46 @@ pub fn look(auditor: &mut Auditor, recorded: &Recorded, part: &Part, columns: &m
     auditor.take(&Run { times: &part.times, names, columns: &columns, parameters });
 }
 
+/// So many columns are turned at a time.
+const SIDE: usize = 32;
+
+/// From so many values on rows are turned on all cores.
+const MANY: usize = 1 << 20;
+
 /// Rows of so many columns as columns, one after the other; small squares at a time, as memory is near then.
 fn turn(rows: &[f64], columns: usize, all: &mut Vec<f64>) {
-    let (count, side) = (rows.len() / columns.max(1), 32);
+    let count = rows.len() / columns.max(1);
     all.resize(rows.len(), 0.0);
-    for (row, column) in (0..count).step_by(side).flat_map(|r| (0..columns).step_by(side).map(move |c| (r, c))) {
-        for i in row..count.min(row + side) {
-            for j in column..columns.min(column + side) {
-                all[j * count + i] = rows[i * columns + j];
+    let turn_some = |(some, turned): (usize, &mut [f64])| {
+        let first = some * SIDE;
+        for row in (0..count).step_by(SIDE) {
+            for (j, column) in turned.chunks_mut(count).enumerate() {
+                for (i, value) in column.iter_mut().enumerate().skip(row).take(SIDE) {
+                    *value = rows[i * columns + first + j];
+                }
             }
         }
+    };
+    let squares = SIDE * count.max(1);
+    match rows.len() < MANY {
+        true => all.chunks_mut(squares).enumerate().for_each(turn_some),
+        false => all.par_chunks_mut(squares).enumerate().for_each(turn_some),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_column_has_its_values() {
+        for (count, columns) in [(1, 1), (3, 5), (64, 100), (33, 31), (70, 16_000)] {
+            let rows: Vec<f64> = (0..count * columns).map(|k| k as f64).collect();
+            let mut turned = Vec::new();
+            turn(&rows, columns, &mut turned);
+            let right = |(k, &value): (usize, &f64)| value == ((k % count) * columns + k / count) as f64;
+            assert!(turned.iter().enumerate().all(right), "{count} by {columns}");
+        }
+        turn(&[], 0, &mut Vec::new());
     }
 }
