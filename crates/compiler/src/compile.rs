@@ -4,7 +4,7 @@ use crate::ast::{Parsed, parse};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate};
+use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate_counting};
 use crate::causal_graph::{self, CausalGraph, assign_causality};
 use crate::diagnostic::{Diagnostic, DiagnosticCode, Diagnostics, Sources, render};
 use crate::equations::{Equations, Form, derive_equations};
@@ -86,8 +86,17 @@ pub fn read(text: Text<'_>) -> Read {
 /// # Errors
 /// As [`to_bond_graph`].
 pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
+    bond_graph_counting(read, text, None)
+}
+
+/// The same where a parameter of the model counts so many turns of repetitions, whatever its value.
+pub(crate) fn bond_graph_counting(
+    read: Read,
+    text: Text<'_>,
+    counted: Option<(&str, i64)>,
+) -> Result<Reached<BondGraph>, Found> {
     let Read { parsed, sources } = read;
-    let elaborated = elaborate(parsed.ast, sources, text.files, text.overrides);
+    let elaborated = elaborate_counting(parsed.ast, sources, text.files, text.overrides, counted);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
     // What could not be read is not there: that others name it, or that its bonds are missing, are no faults of their own.
     if !diagnostics.has_errors() {

@@ -159,14 +159,6 @@ impl Sources {
         self.files.get(file.0 as usize).map_or("", |(_, text)| text)
     }
 
-    /// Puts another text in the place of that of a file.
-    ///
-    /// # Panics
-    /// There is no such file.
-    pub fn replace(&mut self, file: FileId, text: impl Into<String>) {
-        self.files[file.0 as usize].1 = text.into();
-    }
-
     /// The texts of all files, in order.
     pub fn texts(&self) -> impl ExactSizeIterator<Item = &str> {
         self.files.iter().map(|(_, text)| text.as_str())

@@ -1,12 +1,14 @@
-//! Parameters that do nothing but count the turns of repetitions.
+//! Parameters that count the turns of repetitions.
 
 use rustc_hash::FxHashSet;
+use std::ops::Range;
 
 use super::lexer::{Token, TokenKind, lex};
 use crate::span::{FileId, Span};
 
-/// A parameter that only counts: it is the end of repetitions, and else it and their variables stand in indices and in
-/// comparisons alone, with whole numbers added to them.
+/// A parameter that counts: it is the end of repetitions, and where it or their variables decide what there is they stand in
+/// indices and in comparisons alone, with whole numbers added to them. Besides it may be a number in expressions, as in
+/// `length/n`; their variables may not.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Count {
     /// Its name.
@@ -20,17 +22,19 @@ pub struct Count {
     pub reach: i64,
 }
 
-/// The parameters of a model that only count, in the order of the text.
+/// The parameters of a model that count, in the order of the text.
 ///
 /// Names are taken for what they are called, wherever they stand: a parameter whose name, or that of a variable of its
-/// repetitions, is used for something else as well is left out.
+/// repetitions, is used for something else as well is left out. What is made of a parameter that counts, and decides what there
+/// is, does not show here.
 ///
 /// ```
 /// use halfarrow_compiler::ast::counts;
 /// let text = "model M\nparam n = 90\nfor i in 2..n { 0:a[i] -> R:b[i](1 ohm); a[i] -> 1:c[i] -> a[i - 1] }\n";
 /// let found = &counts(text)[0];
 /// assert_eq!((found.name.as_str(), found.value, found.reach), ("n", 90, 2));
-/// assert!(counts(&text.replace("1 ohm", "n*1 ohm")).is_empty());
+/// assert_eq!(counts(&text.replace("1 ohm", "1 ohm/n")).len(), 1);
+/// assert!(counts(&text.replace("1 ohm", "i*1 ohm")).is_empty());
 /// ```
 pub fn counts(text: &str) -> Vec<Count> {
     let is_meant = |token: &Token| !matches!(token.kind, TokenKind::Comment | TokenKind::BlockComment);
@@ -95,7 +99,7 @@ impl<'t> Words<'t> {
         (next.newlines > 0 || matches!(next.kind, TokenKind::Text | TokenKind::End)).then_some((at + 1, value))
     }
 
-    /// What a declared parameter counts, if it does nothing else.
+    /// What a declared parameter counts, if it does.
     fn count(&self, name: usize, value: i64, all: &[Repetition]) -> Option<Count> {
         let counted = self.word(name);
         let ends_there = |r: &&Repetition| r.ends().any(|end| end.name.is_some_and(|n| self.word(n) == counted));
@@ -107,7 +111,8 @@ impl<'t> Words<'t> {
             let is_meant = self.is_word(Some(at), &names);
             let belongs = |r: &&Repetition| r.variable == at || r.ends().any(|end| end.name == Some(at));
             if is_meant && !repetitions.iter().any(belongs) {
-                reach = reach.max(self.reach_of_use(at, &names)?);
+                let is_number = self.word(at) == counted && self.is_number(at);
+                reach = reach.max(if is_number { 0 } else { self.reach_of_use(at, &names)? });
             }
         }
         let token = &self.tokens[name + 2];
@@ -138,6 +143,51 @@ impl<'t> Words<'t> {
         }
     }
 
+    /// Whether a name stands in an expression that gives a number, and not in one that tells how often something is there, or
+    /// whether, or which of many it is.
+    fn is_number(&self, at: usize) -> bool {
+        use TokenKind::{
+            Assign, Caret, Comma, DotDot, End, LBrace, LParen, Minus, Plus, RBrace, RParen, Semicolon, Slash, Star,
+            Text,
+        };
+        let begins = at.checked_sub(1).is_some_and(|before| {
+            matches!(self.kind(before), Assign | Caret | Comma | LParen | Minus | Plus | Slash | Star)
+        });
+        let ends = self.tokens.get(at + 1).is_none_or(|next| {
+            let within = matches!(next.kind, Caret | Comma | Minus | Plus | RParen | Slash | Star);
+            within || next.newlines > 0 || matches!(next.kind, End | RBrace | Semicolon | Text)
+        });
+        let statement = self.statement(at);
+        let brackets = |kind: TokenKind| (statement.start..at).filter(|&other| self.kind(other) == kind).count();
+        let is_index = brackets(TokenKind::LBracket) > brackets(TokenKind::RBracket);
+        let heads_block = (at..statement.end).any(|other| self.kind(other) == LBrace);
+        let repeats = |other: usize| self.kind(other) == DotDot || self.is_word(Some(other), &["for"]);
+        begins && ends && !is_index && !heads_block && !statement.into_iter().any(repeats)
+    }
+
+    /// The words of the statement that a word stands in, with the `{` behind it.
+    fn statement(&self, at: usize) -> Range<usize> {
+        use TokenKind::{LBrace, LBracket, LParen, RBrace, RBracket, RParen, Semicolon};
+        let (mut start, mut open) = (0, 0usize);
+        for (other, token) in self.tokens.iter().enumerate() {
+            let next_line = token.newlines > 0 && open == 0;
+            if (next_line || matches!(token.kind, RBrace | Semicolon)) && other > at {
+                return start..other;
+            }
+            if next_line {
+                start = other;
+            }
+            match token.kind {
+                LParen | LBracket => open += 1,
+                RParen | RBracket => open = open.saturating_sub(1),
+                LBrace if other > at => return start..other + 1,
+                LBrace | RBrace | Semicolon => (start, open) = (other + 1, 0),
+                _ => {}
+            }
+        }
+        start..self.tokens.len()
+    }
+
     /// How far a name reaches where it stands, if it only counts there.
     fn reach_of_use(&self, at: usize, names: &[&str]) -> Option<i64> {
         let is_sum = at.checked_sub(1).is_some_and(|plus| self.kind(plus) == TokenKind::Plus);
@@ -160,7 +210,7 @@ impl<'t> Words<'t> {
         let inside = |at: &usize| matches!(self.kind(*at), Comma | Ident | Number | Plus | Minus);
         let open = (0..=left).rev().find(|at| !inside(at)).filter(|&at| self.kind(at) == LBracket);
         let named = open.and_then(|at| at.checked_sub(1)).filter(|&before| self.kind(before) == Ident);
-        let words = ["in", "if", "and", "or", "not", "then", "else"];
+        let words = ["if", "and", "or", "not", "then", "else"];
         let closed = (right..self.tokens.len()).find(|at| !inside(at)).filter(|&at| self.kind(at) == RBracket);
         let is_given = closed.is_none_or(|at| self.kind(at + 1) == Assign);
         let begins_line = |at: &usize| self.tokens[*at].newlines > 0;
@@ -215,18 +265,36 @@ mod tests {
     }
 
     #[test]
-    fn what_is_used_as_a_number_does_not_count() {
+    fn what_counts_may_be_a_number_too() {
+        for body in [
+            "for i in 1..n { 0:a[i] -> R:b[i](r/n) }",
+            "for i in 1..n { 0:a[i] -> R:b[i](r*(n + 1)^2); a[i] -> C:c[i](1, q0 = n) }",
+            "for i in 1..n { 0:a[i] }\nparam s = r - n*r",
+            "for i in 1..n { 0:a[i] }\nparam s = 1*n \"as many\"",
+            "for i in 1..n { 0:a[i] }\nparam s = r/n",
+            "for i in 1..n { 0:a[i] }\nlet s = max(r*n,\n  -n)",
+            "param s = n\nfor i in 1..n { 0:a[i] }",
+        ] {
+            assert_eq!(found(body), [("n".to_string(), 1)], "{body}");
+        }
+    }
+
+    #[test]
+    fn what_is_used_otherwise_does_not_count() {
         for body in [
             "for i in 1..n { 0:a[i] -> R:b[i](r*i) }",
-            "for i in 1..n { 0:a[i] -> R:b[i](r/n) }",
             "for i in 1..n { param k[i] = i*r }",
-            "for i in 1..n { 0:a[i] }\nparam s = r - n*r",
-            "for i in 1..n { 0:a[i] }\nparam s = 1*n",
-            "for i in 1..n { 0:a[i] }\nparam s = r/n",
             "for i in 1..n { 0:a[i] }\nconst k[n] = 1",
+            "for i in 1..n { 0:a[i] }\nconst k[2*n] = 1",
             "for i in 1..n { 0:a[i] }\ninput u[n]",
-            "for i in 1..n { 0:a[i] }\nlet s = r*n",
             "for i in 1..n { 0:a[i] -> R:b[i](i) }",
+            "for i in 1..n { if i == n/2 { 0:a[i] } }",
+            "for i in 1..n { if 2*n > 5\n { 0:a[i] } }",
+            "for i in 1..n { 0:a[i] }\n1:b -> 0:a[n/2]",
+            "for i in 1..n { 0:a[i] }\nlet s = sum(j in 1..2*n, j)",
+            "for i in 1..n { 0:a[i] }\nlet s = sum(j in 1..\n2*n, j)",
+            "for i in 1..n { 0:a[i] }\nfor j in 1..\n2*n {}",
+            "for i in 1..n { 0:a[i] }\nI:n(3)",
             "for i in 1..n { if 2*i == 4 { 0:a[i] } }",
             "for i in 1..n { if i == 2*m { 0:a[i] } }",
             "for i in 1..n { if i == m { 0:a[i] } }",

@@ -47,11 +47,23 @@ pub struct Elaborated {
 /// let result = bond_graph::elaborate(tree, sources, &bond_graph::NoFiles, &[]);
 /// assert_eq!(result.graph.unwrap().bonds.len(), 1);
 /// ```
-pub fn elaborate(main: Ast, mut sources: Sources, files: &dyn Files, overrides: &[Override]) -> Elaborated {
+pub fn elaborate(main: Ast, sources: Sources, files: &dyn Files, overrides: &[Override]) -> Elaborated {
+    elaborate_counting(main, sources, files, overrides, None)
+}
+
+/// The same where a parameter of the model counts so many turns of repetitions, and places in arrays, whatever its value: the
+/// structure of a model of another size, with the values of this one.
+pub(crate) fn elaborate_counting(
+    main: Ast,
+    mut sources: Sources,
+    files: &dyn Files,
+    overrides: &[Override],
+    counted: Option<(&str, i64)>,
+) -> Elaborated {
     let Loaded { files: trees, imports, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
     let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
-    let mut flat = flatten::flatten(&trees, &given, files);
+    let mut flat = flatten::flatten(&trees, &given, files, counted);
     faults.extend(std::mem::take(&mut flat.faults).into_list());
     overrides::refuse_idle(&given, &flat, &mut faults);
     let Built { graph, faults: more, uses } = match flat.lost {

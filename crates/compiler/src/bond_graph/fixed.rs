@@ -246,7 +246,8 @@ impl<'a> Repeats<'a> {
             _ if d.unit.is_some() => "this has a unit",
             _ => "this has no value",
         };
-        self.named(names, Key::Declared(decl), value.map(|e| (d.reads, e, &*d.item)), what, span)
+        let counted = self.counted_as(&d.name);
+        self.named(names, Key::Declared(decl), counted, value.map(|e| (d.reads, e, &*d.item)), what, span)
     }
 
     fn ahead(
@@ -262,14 +263,22 @@ impl<'a> Repeats<'a> {
             None => (d.value.as_ref(), Here::of(scope)),
         };
         let value = value.filter(|_| d.unit.is_none()).map(|e| (reads, e, &[][..]));
-        self.named(names, Key::Ahead(scope, &d.name.text), value, "this has a unit", span)
+        let counted = self.counted_as(&full);
+        self.named(names, Key::Ahead(scope, &d.name.text), counted, value, "this has a unit", span)
     }
 
-    /// The number that a name stands for, found out once.
+    /// How many turns a parameter counts whatever its value, by its full name.
+    fn counted_as(&self, full: &str) -> Option<i64> {
+        self.counted.filter(|(name, _)| *name == full).map(|(_, turns)| turns)
+    }
+
+    /// The number that a name stands for, found out once. One that counts other turns than its value says stands for these, and
+    /// what follows from it is not known.
     fn named(
         &mut self,
         names: &Names<'a>,
         key: Key<'a>,
+        counted: Option<i64>,
         value: Option<(Here, &'a ast::Expr, &[i64])>,
         what: &str,
         span: Span,
@@ -289,8 +298,14 @@ impl<'a> Repeats<'a> {
         let Some((reads, e, item)) = value else { return Err(Unknown::Reads(span, what.to_string())) };
         self.known.insert(key, Known::Open);
         let outside = std::mem::take(&mut self.read);
-        let found = self.number(names, reads, e, item);
+        let mut found = self.number(names, reads, e, item);
         let of = std::mem::replace(&mut self.read, outside);
+        if let Some(turns) = counted.filter(|_| found.is_ok()) {
+            self.counting.push(key);
+            found = Ok(Rational::from(turns));
+        } else if of.iter().any(|key| self.counting.contains(key)) {
+            found = Err(Unknown::Reads(span, "it counts turns that are not as many as it says".to_string()));
+        }
         let known = match &found {
             Ok(number) => Known::Number(number.clone(), of),
             Err(Unknown::Reads(_, why)) if why.starts_with(FOLLOWS) => Known::Other(why.clone()),

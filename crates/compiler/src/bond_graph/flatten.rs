@@ -241,8 +241,14 @@ pub(super) struct Flat<'a> {
 }
 
 /// Flattens the files of a model, the main one first, with new values of parameters.
-pub(super) fn flatten<'a>(trees: &'a [ast::Ast], given: &'a [Given], files: &'a dyn Files) -> Flat<'a> {
+pub(super) fn flatten<'a>(
+    trees: &'a [ast::Ast],
+    given: &'a [Given],
+    files: &'a dyn Files,
+    counted: Option<(&'a str, i64)>,
+) -> Flat<'a> {
     let mut flat = Flat { files: Some(files), ..Flat::default() };
+    flat.repeats.counted = counted;
     flat.names.overrides = given.iter().map(|g| (g.name.as_str(), &g.value)).collect();
     flat.names.scopes.push(Scope {
         prefix: String::new(),

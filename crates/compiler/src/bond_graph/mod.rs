@@ -56,13 +56,13 @@ mod verify;
 mod warnings;
 mod wire;
 
+pub(crate) use elaborate::elaborate_counting;
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
 pub(crate) use flatten::MAX_PARTS;
 pub(crate) use multibonds::{part_name, strand_name};
 pub use names::{Name, NameKind};
 pub use overrides::Override;
-pub(crate) use overrides::SET;
 pub(crate) use repeat::MAX_TURNS;
 pub use set_valued::{Bound, BoundKind, Branch, Impact, SetValuedLaw};
 pub use shapes::{Shape, ShapeArgument, ShapeKind};

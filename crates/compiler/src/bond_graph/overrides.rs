@@ -12,7 +12,7 @@ use crate::diagnostic::{Diagnostic, Sources, codes};
 use crate::span::Span;
 
 /// How the names of the sources of new values begin.
-pub(crate) const SET: &str = "--set ";
+pub(super) const SET: &str = "--set ";
 
 /// A new value of a parameter.
 ///

@@ -88,6 +88,10 @@ pub(super) struct Repeats<'a> {
     /// Whether a name is only looked up, which is no use of it.
     pub looking: bool,
     pub depth: usize,
+    /// A parameter of the model that counts so many turns, whatever its value.
+    pub counted: Option<(&'a str, i64)>,
+    /// What names it.
+    pub counting: Vec<Key<'a>>,
     /// How many turns have been made, those that are forgotten with them.
     made: usize,
 }
@@ -96,7 +100,9 @@ impl Default for Repeats<'_> {
     fn default() -> Self {
         let (known, shaping) = (FxHashMap::default(), FxHashSet::default());
         let (uses, looking) = (FxHashSet::default(), false);
-        Repeats { turns: vec![None], known, shaping, read: Vec::new(), uses, looking, depth: 0, made: 0 }
+        let (read, counting) = (Vec::new(), Vec::new());
+        let turns = vec![None];
+        Repeats { turns, known, shaping, read, uses, looking, depth: 0, counted: None, counting, made: 0 }
     }
 }
 

@@ -11,7 +11,8 @@ use crate::algebra::{
 };
 use crate::bond_graph::*;
 
-constants!(Comparison, Function, Table1d, HeldKind, ParameterKind, PortCausality, ShapeKind, ShapeArgument);
+// Numbers are the same in all turns and at all sizes: what follows from one that grows may grow otherwise where it is greater.
+constants!(Comparison, Function, Table1d, HeldKind, ParameterKind, PortCausality, Rational, ShapeKind, ShapeArgument,);
 others!(SetValuedLaw);
 
 parts! {
@@ -99,23 +100,8 @@ impl Part for Element {
     }
 }
 
-/// Numbers are the same in all turns and at all sizes, but for the size itself: what follows from one that grows may grow
-/// otherwise where it is greater.
-impl Part for Rational {
-    fn tree(&self, kept: &mut Kept) -> Tree {
-        match self.small() {
-            Some((number, 1)) if number == kept.size => Tree::Whole(number),
-            _ => kept.keep(self),
-        }
-    }
-    fn made(rule: &Rule, at: &At<'_>) -> Option<Self> {
-        rule.whole(at).map(Rational::from).or_else(|| kept(rule, at))
-    }
-}
-
 impl Part for Expr {
-    fn tree(&self, kept: &mut Kept) -> Tree {
-        kept.met.push(*self);
+    fn tree(&self, _: &mut Kept) -> Tree {
         Tree::Whole(i64::from(self.0))
     }
     fn made(rule: &Rule, at: &At<'_>) -> Option<Self> {

@@ -1,9 +1,10 @@
 //! Models of many equal cells: what a stage gives for three sizes that follow each other is continued to the size asked for.
 //!
-//! A parameter that only [counts] the turns of a repetition makes a family of models, one for each size. What is made far
+//! A parameter that [counts] the turns of a repetition makes a family of models, one for each number of turns, all with the
+//! values that the model itself has. What is made far
 //! from the ends of the repetition is made of the same text in the same way, so the graphs, and the programs, of three
 //! sizes tell those of all: each sequence in them is a few entries that stand alone and a few that come again turn by turn,
-//! each number a straight line in the turn and in the size (`rule.rs`). A rule has to give the three it was found from
+//! each place a straight line in the turn and in the size (`rule.rs`). A rule has to give the three it was found from
 //! exactly, and one much larger, in which names have more digits and each turn has left both ends behind; where it does
 //! not, or the text is none of a family, there is no continuation, and the model is compiled as it stands.
 
@@ -19,13 +20,12 @@ mod tree;
 use std::sync::Arc;
 
 use crate::ast::{Count, counts};
-use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, Name, NameKind, Override, SET};
+use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, Name, NameKind};
 use crate::causal_graph::assign_causality;
-use crate::compile::{Found, Reached, Text, to_bond_graph};
+use crate::compile::{Found, Reached, Text, bond_graph_counting, read};
 use crate::diagnostic::Sources;
 use crate::equations::{Form, derive_equations};
 use crate::program::{Program, schedule};
-use crate::span::FileId;
 use rule::Rule;
 use tree::{At, Kept, Part, Tree, constants, parts};
 
@@ -35,10 +35,9 @@ parts! {
     structure Name { name, kind, declared, uses }
 }
 
-/// The size of the smallest model that is looked at, unless its text reaches further: the first; the second where the first, or
-/// one that follows it, is a number of the text; the last where those before tell nothing, since parts of some hundred
-/// variables are gone through in other ways than small ones.
-const SMALLEST: [i64; 3] = [16, 30, 104];
+/// The size of the smallest model that is looked at, unless its text reaches further: the first; the last where it tells
+/// nothing, since parts of some hundred variables are gone through in other ways than small ones.
+const SMALLEST: [i64; 2] = [16, 104];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;
 /// The least size of the one that a rule is tried on: names of cells have three digits there.
@@ -54,8 +53,7 @@ pub struct Family {
     steps: Steps,
     /// Which of the smallest sizes its members begin with, and the size of the first of them.
     smallest: usize,
-    first: i64,
-    /// The texts of the model itself.
+    /// The texts of the model.
     sources: Sources,
     /// Elements in a step of the size.
     elements: usize,
@@ -95,9 +93,9 @@ impl Family {
             sources = Some(found.sources);
             members.push((Arc::new(ir), found.names));
         }
-        let sources = sized.sources(&sources?);
+        let sources = sources?;
         let elements = members[1].0.elements.len().saturating_sub(members[0].0.elements.len());
-        Some(Family { members, steps, smallest, first, sources, elements })
+        Some(Family { members, steps, smallest, sources, elements })
     }
 
     /// The model itself as the continuation of smaller ones.
@@ -126,10 +124,7 @@ impl Family {
     fn continued<T: Part>(&self, mut member: impl FnMut(usize) -> Option<T>) -> Option<T> {
         let Steps { members, wanted } = self.steps;
         let mut kept = Kept::default();
-        let mut tree = |at: usize| {
-            kept.size = self.first + STEP * members[at];
-            member(at).map(|member| member.tree(&mut kept))
-        };
+        let mut tree = |at: usize| member(at).map(|member| member.tree(&mut kept));
         let rule = Rule::learned([&tree(0)?, &tree(1)?, &tree(2)?])?;
         let is_right = rule.gives(&tree(3)?, 0, members[3]);
         is_right.then(|| T::made(&rule, &At { turn: 0, size: wanted, kept: &kept }))?
@@ -142,8 +137,6 @@ struct Sized<'t> {
     count: Count,
     /// How many there are.
     size: i64,
-    /// Whether that is set from outside, and not by the text.
-    is_set: bool,
 }
 
 impl<'t> Sized<'t> {
@@ -152,7 +145,7 @@ impl<'t> Sized<'t> {
         let sized = counts(text.text).into_iter().filter_map(|count| {
             let set = text.overrides.iter().rfind(|set| set.name.trim() == count.name);
             let size = set.map_or(Some(count.value), |set| set.value.trim().parse().ok())?;
-            Some(Sized { text, size, is_set: set.is_some(), count })
+            Some(Sized { text, size, count })
         });
         sized.max_by_key(|sized| sized.size)
     }
@@ -167,55 +160,15 @@ impl<'t> Sized<'t> {
         (reach <= SMALLEST[0] && (LARGER * tried..=MAX_TURNS as i64).contains(&self.size)).then_some((first, steps))
     }
 
-    /// The model with so many cells, if there is nothing to be said of it.
+    /// The model with so many cells, each as in the model itself, if there is nothing to be said of it.
     fn member(&self, size: i64) -> Option<Reached<BondGraph>> {
-        // As many digits as before: places in the text stay where they are.
-        let padded =
-            |digits: &str| Some(format!("{size:0width$}", width = digits.len())).filter(|p| p.len() == digits.len());
-        let Text { text, overrides, .. } = self.text;
-        let (start, end) = (self.count.span.start as usize, self.count.span.end as usize);
-        let own = match self.is_set {
-            true => text.to_string(),
-            false => [&text[..start], &padded(&text[start..end])?, &text[end..]].concat(),
-        };
-        let mut overrides = overrides.to_vec();
-        for set in overrides.iter_mut().filter(|set| self.is_size(set)) {
-            set.value = padded(&set.value)?;
-        }
-        let member = to_bond_graph(Text { text: &own, overrides: &overrides, ..self.text }).ok()?;
+        let member = bond_graph_counting(read(self.text), self.text, Some((&self.count.name, size))).ok()?;
         member.found.diagnostics.0.is_empty().then_some(member)
     }
 
-    /// Whether no number but the size, and such as stand in the text for all cells alike, decides what there is in a member; and
-    /// nothing is made of the size but the value of its parameter.
+    /// Whether no number but the size, and such as stand in the text for all cells alike, decides what there is in a member.
     fn is_all_that_shapes(&self, member: &BondGraph) -> bool {
-        let own = member.parameters.values().find(|p| p.name == self.count.name);
         let mut others = member.parameters.values().filter(|p| p.shapes && p.name != self.count.name);
-        if !others.all(|p| !p.name.contains(['[', '.'])) {
-            return false;
-        }
-        let mut kept = Kept::default();
-        member.tree(&mut kept);
-        // As its value, and as what its symbol is known to be.
-        own.is_some_and(|own| kept.met.iter().filter(|e| **e == own.value).count() == 2)
-    }
-
-    fn is_size(&self, set: &Override) -> bool {
-        set.name.trim() == self.count.name
-    }
-
-    /// The texts of the model, by those of a member.
-    fn sources(&self, member: &Sources) -> Sources {
-        let mut sources = member.clone();
-        let main = self.count.span.file;
-        sources.replace(main, self.text.text);
-        // Values that are set have texts of their own, in order.
-        let files = (main.0 + 1..member.texts().len() as u32).map(FileId);
-        let of_values = files.filter(|&file| member.name(file).starts_with(SET));
-        for (file, set) in of_values.zip(self.text.overrides).filter(|(_, set)| self.is_size(set)) {
-            let own = member.text(file);
-            sources.replace(file, [&own[..own.len() - set.value.len()], &set.value].concat());
-        }
-        sources
+        others.all(|p| !p.name.contains(['[', '.']))
     }
 }

@@ -59,18 +59,13 @@ impl Part for Reads {
     }
 }
 
-/// A number of a program; as in graphs none grows but the size.
+/// A number of a program; as in graphs none grows.
 impl Part for Bits {
-    fn tree(&self, kept: &mut Kept) -> Tree {
-        let number = self.number();
-        match number == kept.size as f64 {
-            true => Tree::Whole(kept.size),
-            false => Tree::Real(number.to_bits()),
-        }
+    fn tree(&self, _: &mut Kept) -> Tree {
+        Tree::Real(self.number().to_bits())
     }
-    fn made(rule: &Rule, at: &At<'_>) -> Option<Self> {
-        let number = rule.whole(at).map(|size| size as f64).or_else(|| rule.real())?;
-        Some(Bits::of(number))
+    fn made(rule: &Rule, _: &At<'_>) -> Option<Self> {
+        rule.real().map(Bits::of)
     }
 }
 

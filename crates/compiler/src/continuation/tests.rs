@@ -1,6 +1,6 @@
 use super::tree::{Kept, Part, Tree};
 use super::*;
-use crate::bond_graph::NoFiles;
+use crate::bond_graph::{NoFiles, Override};
 use crate::compile::{self, to_bond_graph};
 
 /// A line of resistors with a capacitor to ground behind each of them.
@@ -168,10 +168,7 @@ fn misfit(rule: &Rule, tree: &Tree, turn: i64, size: i64) -> String {
 /// Why a family has no continued program.
 fn obstacles(family: &Family) -> String {
     let mut kept = Kept::default();
-    let mut at = 0;
     let program = |(graph, _): &Member| {
-        kept.size = family.first + STEP * family.steps.members[at];
-        at += 1;
         schedule(&derive_equations(&assign_causality(graph).unwrap(), Form::Minimal).unwrap()).tree(&mut kept)
     };
     let trees: Vec<Tree> = family.members.iter().map(program).collect();
@@ -184,7 +181,6 @@ fn obstacle_of_graph(own: &str) -> String {
     let mut kept = Kept::default();
     let mut trees = Vec::new();
     for size in [16, 18, 20, 104] {
-        kept.size = size;
         let Some(member) = sized.member(size) else { return ": something is to be said of a member".into() };
         trees.push(member.ir.tree(&mut kept));
     }
@@ -307,6 +303,50 @@ fn numbers_that_grow_from_cell_to_cell_are_not_continued() {
     exactly(900, &row("", "param m = 3\nfor j in 1..m {\n a[j] -> R:leak[j](1)\n }"));
 }
 
+/// A rod, a line of so many parts of what it has as a whole.
+const ROD: &str = "
+param length = 2 m
+param area = 3 cm^2
+param modulus = 200 GPa
+param mass = 5 kg
+param drag = 0.1 N.s/m
+param h = length/n
+for i in 1..n {
+    1:v[i] -> I:m[i](mass/n)
+    v[i] -> R:b[i](drag/n + drag*min(n, 300)/n)
+    if i == 1 { 1:v0 -> 0:force[1] -> v[1] } else { v[i - 1] -> 0:force[i] -> v[i] }
+    force[i] -> C:k[i](k = modulus*area/h)
+}
+Sf:wall(0 m/s) -> v0
+v[n] -> R:end(drag/(1 + h/(1 m)))
+Se:pull(if n > 3 then 20 N else 1 N) -> v[n]
+";
+
+#[test]
+fn what_is_divided_among_the_cells_is_continued_exactly() {
+    exactly(900, ROD);
+    exactly(901, &row("", "param h = 1*n\na[2] -> R:leak(1 + min(h, 300))\na[3] -> R:other(min(max(h - 200, 1), 4))"));
+    exactly(902, &row("a[i] -> R:leak[i](1 + min(n, 500)/(2*n))", "let z = n\na[2] -> R:other(z)"));
+}
+
+#[test]
+fn what_follows_from_the_count_decides_nothing_that_is_continued() {
+    for body in [
+        row("", "param half = n/2\na[half] -> R:leak(1)"),
+        row("", "param far = 2*n\nfor j in 1..3 {\n if far > 1000 {\n a[j] -> R:leak[j](1)\n }\n }"),
+        row("", "const far = n - 100\na[far] -> R:leak(1)"),
+        row("", "let far = n - 100\nfor j in 1..far {\n a[j] -> R:leak[j](1)\n }"),
+        format!(
+            "component Few(param k = 2; port p) {{\n p -> 0:z\n for j in 1..k {{\n z -> R:r[j](1)\n }}\n}}\n{}",
+            row("", "Few:few(k = n)\na[2] -> few.p")
+        ),
+    ] {
+        let own = model(900, &body);
+        to_bond_graph(text(&own)).unwrap_or_else(|found| panic!("{}", found.render(false)));
+        assert!(continued(text(&own)).is_none(), "{own}");
+    }
+}
+
 #[test]
 fn a_size_that_is_set_counts() {
     let own = model(10, LADDER);
@@ -400,4 +440,20 @@ fn many_lines_of_random_cells() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
     let (from, count) = (number("FROM").unwrap_or(0), number("SEEDS").unwrap_or(100));
     println!("{} of {count} continued", random_lines(from..from + count));
+}
+
+/// What keeps a model of a file from being continued:
+/// `MODEL=line.bond cargo test -p halfarrow-compiler --lib -- continuation::tests::obstacle --ignored --nocapture`
+#[test]
+#[ignore = "asks for a file"]
+fn obstacle_of_a_file() {
+    let own = std::fs::read_to_string(std::env::var("MODEL").expect("MODEL names a file")).expect("it can be read");
+    let Some(family) = Family::of(text(&own)) else { return println!("no family{}", obstacle_of_graph(&own)) };
+    let is_whole = |family: &Family| family.bond_graph().is_some() && family.program(Form::Minimal).is_some();
+    let family = if is_whole(&family) { family } else { family.larger(text(&own)).unwrap_or(family) };
+    match (family.bond_graph(), family.program(Form::Minimal)) {
+        (Some(_), Some(_)) => println!("continued"),
+        (None, _) => println!("no continued graph{}", obstacle_of_graph(&own)),
+        (_, None) => println!("no continued program{}", obstacles(&family)),
+    }
 }

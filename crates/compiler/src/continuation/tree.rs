@@ -5,7 +5,6 @@ use std::any::{Any, TypeId};
 use rustc_hash::FxHashMap;
 
 use super::rule::Rule;
-use crate::algebra::Expr;
 
 /// A value as what it is made of.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,10 +28,6 @@ pub(super) enum Tree {
 /// Values that are the same in all turns and at all sizes, each once.
 #[derive(Debug, Default)]
 pub(super) struct Kept {
-    /// The size of the model that is taken apart: of all numbers the only one that grows.
-    pub size: i64,
-    /// All references to expressions in it.
-    pub met: Vec<Expr>,
     all: Vec<Box<dyn Any + Send + Sync>>,
     of_type: FxHashMap<TypeId, Vec<u32>>,
 }
