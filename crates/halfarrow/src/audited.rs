@@ -26,7 +26,7 @@ use crate::verdict::Verdict;
 
 /// Samples audited at once at most, and at least: what bounds the memory of long runs.
 const CHUNK: usize = 4096;
-const LEAST: usize = 64;
+const LEAST: usize = 32;
 /// Values kept for the next audit, of models that have many.
 const KEPT: usize = 1 << 22;
 

@@ -69,8 +69,8 @@ fn stages(model: &Model) -> Vec<&'static str> {
 
 #[test]
 fn a_model_of_equal_cells_continues_smaller_ones_and_has_the_bits_of_itself() {
-    // What counts cells stands in a sum here, and so the second one is compiled as it stands.
-    let (continued, stands) = (line(""), line("let count = n - 1"));
+    // What counts cells is divided in an index here, and so the second one is compiled as it stands.
+    let (continued, stands) = (line(""), line("let middle = c[n/2].q"));
     let run = Run { to: 2e-3, ..Run::default() };
     let of =
         |model: &Model| model.simulate(&run, &mut |_| true).unwrap_or_else(|error| panic!("{}", error.render(false)));
@@ -102,5 +102,5 @@ fn a_run_that_stops_tells_what_the_model_itself_tells() {
         let run = Run { to: 0.05, ..Run::default() };
         line(more).simulate(&run, &mut |_| true).expect_err("a run that stops").render(false)
     };
-    assert_eq!(why(&text("")), why(&text("let count = n - 1")));
+    assert_eq!(why(&text("")), why(&text("let middle = c[n/2].q")));
 }

@@ -278,12 +278,29 @@ struct Builder<'a> {
     preamble: bool,
     /// More values that stand before the routine runs.
     given: FxHashSet<Value>,
-    local: FxHashMap<Value, Local>,
+    local: Locals,
     /// Blocks that are solved so far.
     solved: FxHashSet<BlockId>,
     code: Code,
     /// The Newton block that is open.
     inner: Inner,
+}
+
+/// The local of each value of a program that has one.
+struct Locals(Vec<Option<Local>>);
+
+impl Locals {
+    fn of(program: &Program) -> Locals {
+        Locals(vec![None; program.values.len()])
+    }
+
+    fn get(&self, value: Value) -> Option<Local> {
+        self.0[value.index()]
+    }
+
+    fn insert(&mut self, value: Value, local: Local) {
+        self.0[value.index()] = Some(local);
+    }
 }
 
 /// The code of a Newton block while it is put together.
@@ -307,7 +324,7 @@ enum Item {
 
 impl<'a> Builder<'a> {
     fn new(program: &'a Program, preamble: bool) -> Self {
-        let (local, code, inner) = (FxHashMap::default(), Code::default(), Inner::default());
+        let (local, code, inner) = (Locals::of(program), Code::default(), Inner::default());
         let (given, solved) = (FxHashSet::default(), FxHashSet::default());
         Builder { program, preamble, given, local, solved, code, inner }
     }
@@ -316,6 +333,9 @@ impl<'a> Builder<'a> {
         let mut roots = wanted.to_vec();
         let guarded = |w: &u32| &self.program.pivot_guards[*w as usize];
         roots.extend(pivot_guards.iter().map(guarded).flat_map(|w| [w.pivot, w.scale]));
+        if roots.is_empty() {
+            return Routine { wanted: roots, code: self.code };
+        }
         let live = self.program.dataflow().live_but_for(&roots, self.preamble, &self.given);
         self.order(&live, pivot_guards).into_iter().for_each(|item| self.emit(item));
         self.code.outputs = wanted.iter().map(|&v| self.arg(v)).collect();
@@ -407,7 +427,9 @@ impl<'a> Builder<'a> {
                 }
                 _ => items.push(Item::Value(value)),
             }
-            items.extend(watch_after.remove(&value).unwrap_or_default().into_iter().map(Item::PivotGuard));
+            if let Some(guards) = watch_after.get(&value).filter(|_| !watch_after.is_empty()) {
+                items.extend(guards.iter().copied().map(Item::PivotGuard));
+            }
         }
         items
     }
@@ -476,7 +498,9 @@ impl<'a> Builder<'a> {
         let unknowns = (0..program.blocks[block].size()).map(|i| {
             let solution = program.values.find(Op::Solution(block, i as u32));
             let local = self.code.define(solution);
-            solution.map(|v| self.local.insert(v, local));
+            if let Some(value) = solution {
+                self.local.insert(value, local);
+            }
             local
         });
         let unknowns = unknowns.collect();
@@ -486,7 +510,7 @@ impl<'a> Builder<'a> {
     }
 
     fn arg(&self, v: Value) -> Arg {
-        self.local.get(&v).map_or(Arg::Given(v), |&local| Arg::Local(local))
+        self.local.get(v).map_or(Arg::Given(v), Arg::Local)
     }
 
     /// What stands in the code of the open block for a value.

@@ -86,7 +86,7 @@ impl BlockBatches {
             let known = |a: &Arg| if let Arg::Local(local) = a { Some(defined_at[local.0 as usize]) } else { None };
             let last = outer.iter().filter_map(known).max();
             let place = |a: Arg| match a {
-                Arg::Given(value) => layout.registers[&value],
+                Arg::Given(value) => layout.registers[value],
                 Arg::Outer(i) => there.outer[i as usize],
                 Arg::Local(_) | Arg::Guess(_) => unreachable!("these stand inside"),
             };

@@ -64,7 +64,7 @@ impl Packed {
     /// The routine in packed order; registers below `fixed` are given.
     pub fn new(layout: &Layout, routine: &Routine) -> Packed {
         let slot = |a: Arg| match a {
-            Arg::Given(value) => layout.registers[&value],
+            Arg::Given(value) => layout.registers[value],
             Arg::Local(local) => layout.size + local.0,
             Arg::Outer(_) | Arg::Guess(_) => unreachable!("no code of a Newton block"),
         };

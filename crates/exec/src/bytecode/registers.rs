@@ -5,6 +5,7 @@ use super::instruction::{Instruction, Operation, Register, Routine, Solve};
 use halfarrow_compiler::ids::Id;
 use halfarrow_compiler::program::{self, Arg, Code, Method, Op, Program, Step, Value};
 use rustc_hash::FxHashMap;
+use std::ops::Index;
 use std::sync::Arc;
 
 /// Registers that keep their contents between routines: parameters, constants and what is computed from them; time,
@@ -12,7 +13,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Layout {
     /// The register of each value that has a fixed one.
-    pub registers: FxHashMap<Value, Register>,
+    pub registers: Fixed,
     /// Constants and their registers.
     pub constants: Vec<(Register, f64)>,
     /// First register of the parameters.
@@ -37,10 +38,33 @@ pub(crate) struct Layout {
     determined: Vec<Value>,
 }
 
+/// The fixed registers of values, by value.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Fixed(Vec<Register>);
+
+impl Fixed {
+    /// The register of a value, if it has a fixed one.
+    pub fn get(&self, value: Value) -> Option<Register> {
+        self.0.get(value.index()).copied().filter(|&register| register != NONE)
+    }
+
+    fn insert(&mut self, value: Value, register: Register) {
+        self.0[value.index()] = register;
+    }
+}
+
+impl Index<Value> for Fixed {
+    type Output = Register;
+    fn index(&self, value: Value) -> &Register {
+        &self.0[value.index()]
+    }
+}
+
 impl Layout {
     /// The fixed registers of a program where these values are wanted besides its own.
     pub fn new(program: &Program, more: &[Value]) -> Layout {
-        let mut layout = Layout { determined: program.determined(more), ..Layout::default() };
+        let registers = Fixed(vec![NONE; program.values.len()]);
+        let mut layout = Layout { determined: program.determined(more), registers, ..Layout::default() };
         let mut next = program.parameters.len() as u32;
         for &value in &layout.determined {
             match program.values.op(value) {
@@ -59,7 +83,8 @@ impl Layout {
         layout.rates = layout.states + program.states.len() as u32;
         layout.positions = layout.rates + if program.implicit.is_some() { program.states.len() as u32 } else { 0 };
         layout.size = layout.positions + program.positions.len() as u32;
-        layout.registers.extend(program.positions.iter().map(|p| p.value).zip(layout.positions..));
+        let positions = program.positions.iter().zip(layout.positions..);
+        positions.for_each(|(position, register)| layout.registers.insert(position.value, register));
         for (value, op) in program.values.iter() {
             let register = match op {
                 Op::Parameter(i) => layout.parameters + i,
@@ -82,7 +107,7 @@ impl Layout {
         let mut fixed = FxHashMap::default();
         for (value, output) in routine.wanted.iter().zip(&routine.code.outputs) {
             if let Arg::Local(local) = *output {
-                fixed.insert(local.0, self.registers[value]);
+                fixed.insert(local.0, self.registers[*value]);
             }
         }
         Allocator::new(self, &fixed).routine(routine.code)
@@ -261,7 +286,7 @@ impl<'a> Allocator<'a> {
 
     fn register(&self, places: &Places, a: Arg) -> Register {
         match a {
-            Arg::Given(value) => self.layout.registers[&value],
+            Arg::Given(value) => self.layout.registers[value],
             Arg::Local(local) => places.register[local.index()],
             Arg::Outer(i) => places.outer[i as usize],
             Arg::Guess(i) => places.guess[i as usize],

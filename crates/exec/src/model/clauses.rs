@@ -39,7 +39,7 @@ impl Clauses {
         let (conditional, conditions): (Vec<usize>, Vec<Value>) = conditions.unzip();
         let period = |trigger| match trigger {
             Trigger::Becomes(_) => None,
-            Trigger::Every(period) => layout.registers.get(&period).copied(),
+            Trigger::Every(period) => layout.registers.get(period),
         };
         let still = |c: &halfarrow_compiler::program::Clause| c.bound.and_then(|b| b.gap).map(|(_, still)| still);
         let values = |c: &halfarrow_compiler::program::Clause| {

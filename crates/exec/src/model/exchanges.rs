@@ -500,8 +500,8 @@ impl Model {
             let (Some(&value), Some(&known)) = (program.variables.get(symbol), values.get(symbol)) else {
                 return Ok(false);
             };
-            match layout.registers.get(&value) {
-                Some(&own) if own == register && k < x.len() => x[k] = known,
+            match layout.registers.get(value) {
+                Some(own) if own == register && k < x.len() => x[k] = known,
                 _ => open.push((register, value, known)),
             }
         }

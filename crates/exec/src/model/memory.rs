@@ -143,10 +143,10 @@ impl Model {
     /// Delays, samples and discrete variables as they are before a run.
     pub(super) fn empty_delays_and_samples(&self) -> Vec<DelayOrSample> {
         let code = &self.code;
-        let time = |i: usize| code.layout.registers.get(&code.program.held[i].time).map(|&r| self.frame.r[r as usize]);
+        let time = |i: usize| code.layout.registers.get(code.program.held[i].time).map(|r| self.frame.r[r as usize]);
         let start = |i: usize| {
-            let register = code.layout.registers.get(&code.program.held[i].source);
-            register.map_or(0.0, |&register| self.frame.r[register as usize])
+            let register = code.layout.registers.get(code.program.held[i].source);
+            register.map_or(0.0, |register| self.frame.r[register as usize])
         };
         let held = code.program.held.iter().enumerate().map(|(i, h)| {
             let time = time(i).unwrap_or(f64::NAN);

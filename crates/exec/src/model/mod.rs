@@ -257,7 +257,7 @@ impl Model {
 
     /// What a value of parameters alone comes to: a delay, the default of an input.
     pub fn constant(&self, value: Value) -> Option<f64> {
-        let register = *self.code.layout.registers.get(&value)?;
+        let register = self.code.layout.registers.get(value)?;
         (self.code.program.values.reads(value) == Reads::PARAMETERS).then(|| self.frame.r[register as usize])
     }
 
@@ -344,7 +344,7 @@ impl Model {
         }
         let inputs = &mut self.setup.inputs;
         for (signal, input) in inputs.iter_mut().zip(&self.code.program.inputs) {
-            if let Some(&register) = self.code.layout.registers.get(&input.default) {
+            if let Some(register) = self.code.layout.registers.get(input.default) {
                 signal.set_default(self.frame.r[register as usize]);
             }
         }

@@ -164,7 +164,7 @@ impl Model {
 
     /// Checks that every start value is finite.
     fn check_asked(&self) -> Result<(), StartError> {
-        let value = |asked: &Value| self.code.layout.registers.get(asked).map(|&r| self.frame.r[r as usize]);
+        let value = |asked: &Value| self.code.layout.registers.get(*asked).map(|r| self.frame.r[r as usize]);
         let given = self.code.program.start.iter().map(|s| (&s.asked, &s.name, s.span));
         for (asked, name, span) in given.chain(self.code.program.guesses.iter().map(|g| (&g.asked, &g.name, g.span))) {
             if let Some(value) = value(asked).filter(|v| !v.is_finite()) {
@@ -405,8 +405,8 @@ impl Model {
         let n = group.unknowns.len();
         let terms = self.rounding_of(group, routine);
         let asked = |i: usize| {
-            let register = self.code.layout.registers.get(&self.code.program.start[group.conditions[i]].asked);
-            register.map_or(0.0, |&r| self.frame.r[r as usize].abs())
+            let register = self.code.layout.registers.get(self.code.program.start[group.conditions[i]].asked);
+            register.map_or(0.0, |r| self.frame.r[r as usize].abs())
         };
         let size = |i: usize| {
             let terms = group.unknowns.iter().enumerate().map(|(j, &u)| (jacobian[i * n + j] * z[u as usize]).abs());
@@ -508,8 +508,8 @@ impl Model {
     fn has_run_away(&self, group: &StartGroup, z: &[f64], jacobians: [&[f64]; 2]) -> bool {
         let n = group.unknowns.len();
         let start = &self.code.program.start;
-        let asked = group.conditions.iter().filter_map(|&c| self.code.layout.registers.get(&start[c].asked));
-        let most = asked.fold(1.0f64, |most, &register| most.max(self.frame.r[register as usize].abs()));
+        let asked = group.conditions.iter().filter_map(|&c| self.code.layout.registers.get(start[c].asked));
+        let most = asked.fold(1.0f64, |most, register| most.max(self.frame.r[register as usize].abs()));
         let is_beyond = group.unknowns.iter().any(|&u| z[u as usize].abs() > BEYOND * most);
         let greatest = |jacobian: &[f64], i: usize| jacobian[i * n..][..n].iter().fold(0.0f64, |m, j| m.max(j.abs()));
         let is_lost = |(i, &c): (usize, &usize)| {

@@ -58,6 +58,8 @@ pub(crate) struct Run<'a> {
     seen: Option<f64>,
     samples: Samples,
     values: Vec<f64>,
+    /// The time that the values belong to, as long as nothing has happened to the point or to the system since.
+    observed: Option<f64>,
     /// A point inside a step.
     inside: Vec<f64>,
     /// Whether an event has been handled where the run stands.
@@ -91,6 +93,7 @@ impl<'a> Run<'a> {
                 Some(every) => Samples::Grid(Grid::new(options.from, every)),
             },
             values: vec![0.0; events.observed()],
+            observed: None,
             inside: Vec::new(),
             handled: false,
             vanished: 0,
@@ -124,6 +127,7 @@ impl<'a> Run<'a> {
             seen,
             samples,
             values,
+            observed: None,
             inside,
             handled,
             vanished: 0,
@@ -248,6 +252,7 @@ impl<'a> Run<'a> {
 
     /// Puts the point back onto what its rates keep, if the run is to do so.
     fn project(&mut self, events: &mut dyn Events, t: f64, point: &mut [f64]) -> Result<(), Failure> {
+        self.observed = None;
         if self.options.project && events.project(t, point)? {
             self.counts.projections += 1;
         }
@@ -266,6 +271,7 @@ impl<'a> Run<'a> {
             (false, Method::Fixed(_)) => StepEnd::Fixed,
             (false, _) => StepEnd::Controlled,
         };
+        self.observed = None;
         let exchanged = events.exchange_independent(self.time, point, step)?;
         if exchanged {
             self.counts.exchanges += 1;
@@ -318,6 +324,7 @@ impl<'a> Run<'a> {
     }
 
     fn handle(&mut self, events: &mut dyn Events, point: &mut [f64]) -> Result<(), Failure> {
+        self.observed = None;
         events.handle_event(self.time, point)?;
         if self.signs.len() != events.indicators() {
             self.signs.renew(events.indicators());
@@ -328,6 +335,7 @@ impl<'a> Run<'a> {
     }
 
     fn accept(&mut self, events: &mut dyn Events, point: &[f64]) -> Result<(), Failure> {
+        self.observed = None;
         events.accept(self.time, point)?;
         if self.seen == Some(self.time) { Ok(()) } else { self.show(events, point) }
     }

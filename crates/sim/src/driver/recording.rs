@@ -25,7 +25,7 @@ impl Run<'_> {
             return Ok(());
         }
         self.seen = Some(self.time);
-        events.observe(self.time, point, &mut self.values)?;
+        self.observe(events, self.time, point)?;
         events.passed_pole(self.time)?;
         self.sink.watch(self.time, &self.values)
     }
@@ -78,7 +78,9 @@ impl Run<'_> {
 
     /// Hands over the values at `(t, point)` as the sample of time `label`.
     pub(super) fn record(&mut self, events: &mut dyn Events, label: f64, t: f64, point: &[f64]) -> Result<(), Failure> {
-        events.observe(t, point, &mut self.values)?;
+        if self.observed != Some(t) {
+            self.observe(events, t, point)?;
+        }
         if let Some(value) = self.values.iter().position(|value| value.is_nan()) {
             return Err(Failure::NotFinite { time: t, what: Affected::variable(events.observed_name(value)) });
         }
@@ -86,8 +88,16 @@ impl Run<'_> {
         Ok(())
     }
 
+    fn observe(&mut self, events: &mut dyn Events, t: f64, point: &[f64]) -> Result<(), Failure> {
+        self.observed = None;
+        events.observe(t, point, &mut self.values)?;
+        self.observed = Some(t);
+        Ok(())
+    }
+
     /// Hands over values that were observed elsewhere, as the sample that is due.
     pub(crate) fn record_values(&mut self, label: f64, values: impl Iterator<Item = f64>) {
+        self.observed = None;
         self.values.iter_mut().zip(values).for_each(|(own, value)| *own = value);
         self.hand_over(label);
     }

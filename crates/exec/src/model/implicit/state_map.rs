@@ -60,8 +60,7 @@ impl StateMap {
         let mut pairs: Vec<(usize, Value)> = Vec::new();
         for (k, symbol) in other.tracked.iter().enumerate() {
             let register = reference_code.layout.states + k as u32;
-            let is_state =
-                there(symbol).and_then(|v| reference_code.layout.registers.get(&v).copied()) == Some(register);
+            let is_state = there(symbol).and_then(|v| reference_code.layout.registers.get(v)) == Some(register);
             let told = if is_state { &own.variables } else { &own.momenta };
             pairs.extend(told.get(symbol).map(|&value| (k, value)));
         }

@@ -173,7 +173,7 @@ impl Model {
         let clauses = self.run.clauses.iter().zip(&code.program.clauses).filter(|(memory, _)| memory.is_due(t));
         let due: Vec<_> = periods.chain(clauses.map(|(_, clause)| clause.trigger.value())).collect();
         for period in due {
-            let Some(&register) = code.layout.registers.get(&period) else { continue };
+            let Some(register) = code.layout.registers.get(period) else { continue };
             let whole = (t / self.frame.r[register as usize]).round();
             for (j, instant) in instants.iter_mut().enumerate() {
                 let slope = self.variation.as_ref().expect("it is varied").fixed[j][register as usize];

@@ -95,7 +95,7 @@ impl Model {
                         false => return Err(format!("{} is given over time: it is no number to vary", names[j])),
                     },
                     _ if signal.moves() => 0.0,
-                    _ => code.layout.registers.get(&input.default).map_or(0.0, |&r| fixed[r as usize]),
+                    _ => code.layout.registers.get(input.default).map_or(0.0, |r| fixed[r as usize]),
                 };
             }
             variation.fixed.push(fixed);
@@ -284,7 +284,7 @@ impl Model {
             Quantity::Input(index) => register(Some(layout.inputs + index as u32)),
             Quantity::Nothing => 0.0,
             Quantity::State(index) => self.run.scales.get(index).copied().unwrap_or(0.0),
-            Quantity::Start(index) => register(layout.registers.get(&self.code.program.start[index].asked).copied()),
+            Quantity::Start(index) => register(layout.registers.get(self.code.program.start[index].asked)),
         }
     }
 }
