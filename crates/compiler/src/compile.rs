@@ -1,6 +1,6 @@
 //! The chain of stages.
 
-use crate::ast::{Parsed, parse};
+use crate::ast::{Ast, Parsed, parse};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -72,6 +72,13 @@ pub fn to_bond_graph(text: Text<'_>) -> Result<Reached<BondGraph>, Found> {
 pub struct Read {
     parsed: Parsed,
     sources: Sources,
+}
+
+impl Read {
+    /// The text as its statements, as far as they could be read.
+    pub(crate) fn ast(&self) -> &Ast {
+        &self.parsed.ast
+    }
 }
 
 /// Reads the text alone, without what it imports.

@@ -8,7 +8,7 @@ use halfarrow_compiler::ast;
 use halfarrow_compiler::bond_graph::{BondGraph, FileError, Override};
 use halfarrow_compiler::causal_graph::{self, CausalGraph, assign_causality};
 use halfarrow_compiler::causal_paths::{CausalPaths, find_paths};
-use halfarrow_compiler::compile::{self, Found, Reached, Text};
+use halfarrow_compiler::compile::{self, Found, Reached, Read, Text};
 use halfarrow_compiler::continuation::Family;
 use halfarrow_compiler::diagnostic::{Diagnostics, Sources};
 use halfarrow_compiler::equations::{Equations, Form, derive_equations};
@@ -47,15 +47,15 @@ pub(crate) struct Continued {
 
 impl Continued {
     /// The family of a model, if there is one, and the model as its continuation. The program is made beside the graph.
-    fn of(text: Text<'_>) -> Option<(Continued, Reached<BondGraph>)> {
-        let mut family = Family::of(text)?;
+    fn of(text: Text<'_>, read: &Read) -> Option<(Continued, Reached<BondGraph>)> {
+        let mut family = Family::of(text, read)?;
         loop {
             let (reached, minimal) = rayon::join(|| family.bond_graph(), || family.program(Form::Minimal));
             if let Some(reached) = reached {
                 let has_minimal = minimal.is_some();
                 return Some((Continued { family, minimal: Mutex::new(minimal), has_minimal }, reached));
             }
-            family = family.larger(text)?;
+            family = family.larger(text, read)?;
         }
     }
 
@@ -109,7 +109,7 @@ impl Model {
         let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides: &overrides };
         let watch = Watch::default();
         let read = watch.time("ast", || compile::read(text));
-        let (family, Reached { ir: graph, found }) = watch.time("bond_graph", || match Continued::of(text) {
+        let (family, Reached { ir: graph, found }) = watch.time("bond_graph", || match Continued::of(text, &read) {
             Some((family, reached)) => Ok((Some(Arc::new(family)), reached)),
             None => compile::bond_graph_of(read, text).map(|reached| (None, reached)),
         })?;
@@ -236,7 +236,7 @@ impl Model {
         let text = Text { name: source.name(), text: source.content(), files: source.files(), overrides };
         let again = form != Form::Minimal || own.has_minimal;
         let first = again.then(|| own.family.program(form)).flatten();
-        first.or_else(|| own.family.larger(text)?.program(form))
+        first.or_else(|| own.family.larger(text, &compile::read(text))?.program(form))
     }
 
     pub(crate) fn program_of(&self, equations: &Equations) -> Program {

@@ -46,7 +46,8 @@ impl<'a> Flat<'a> {
         }
         let (unit, doc) = (d.unit.as_ref(), d.doc.as_ref());
         let one = d.indices.iter().any(|e| arrays::reads_variable(&self.repeats, here.turn, e));
-        let Some(indices) = self.indices(here, &d.indices) else { return };
+        let indices = if one { self.indices(here, &d.indices) } else { self.sizes(here, &d.indices) };
+        let Some(indices) = indices else { return };
         if one || indices.is_empty() {
             self.declare(here, reads, (&d.name, &indices), kind, unit, doc);
             return;
@@ -161,20 +162,40 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// A whole number that shapes the model; says so if it is none.
+    /// A whole number that tells how many there are of something; says so if it is none.
     pub fn whole(&mut self, here: Here, e: &'a ast::Expr, what: &str) -> Option<i64> {
-        match self.repeats.whole(&self.names, here, e, what) {
-            Ok(value) => Some(value),
-            Err(fault) => {
+        let found = self.repeats.whole(&self.names, here, e, what);
+        self.or_lost(found)
+    }
+
+    /// The same of an end of a repetition, and whether it follows from what counts.
+    pub fn repetition_end(&mut self, here: Here, e: &'a ast::Expr, what: &str) -> Option<(i64, bool)> {
+        let found = self.repeats.end(&self.names, here, e, what);
+        self.or_lost(found)
+    }
+
+    /// An index; says so if it is none.
+    pub fn index(&mut self, here: Here, e: &'a ast::Expr) -> Option<i64> {
+        let found = self.repeats.place(&self.names, here, e, "an index");
+        self.or_lost(found)
+    }
+
+    fn or_lost<T>(&mut self, found: Result<T, Option<Box<Diagnostic>>>) -> Option<T> {
+        found
+            .map_err(|fault| {
                 self.faults.maybe(fault.map(|f| *f));
                 self.lost = true;
-                None
-            }
-        }
+            })
+            .ok()
     }
 
     /// The indices of what is declared; says so if they are none.
     pub fn indices(&mut self, here: Here, list: &'a [ast::Expr]) -> Option<Indices> {
+        list.iter().map(|e| self.index(here, e)).collect()
+    }
+
+    /// How many elements an array has in each direction.
+    pub fn sizes(&mut self, here: Here, list: &'a [ast::Expr]) -> Option<Indices> {
         list.iter().map(|e| self.whole(here, e, "an index")).collect()
     }
 }

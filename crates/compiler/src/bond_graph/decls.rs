@@ -596,6 +596,7 @@ impl<'a> Builder<'a, '_> {
         let indices = found.indices();
         let entries = found.items.into_iter().zip(&indices);
         let items = entries.map(|(value, at)| self.name_value(decl, value, at, e.span, output)).collect();
+        self.note_array(found.shape.iter().product());
         self.shapes.insert(decl, Shaped { shape: found.shape, items });
     }
 

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::assemble::{Asked, Laws, Title};
 use super::builder::Builder;
 use super::constraint::Relation;
+use super::counted::Counted;
 use super::files::Files;
 use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
@@ -52,7 +53,8 @@ pub fn elaborate(main: Ast, sources: Sources, files: &dyn Files, overrides: &[Ov
 }
 
 /// The same where a parameter of the model counts so many turns of repetitions, and places in arrays, whatever its value: the
-/// structure of a model of another size, with the values of this one.
+/// structure of a model of another size, with the values of this one. There is no graph where anything in it may be otherwise
+/// at another size than [`NEAR`](super::NEAR) the ends of the repetitions.
 pub(crate) fn elaborate_counting(
     main: Ast,
     mut sources: Sources,
@@ -73,7 +75,8 @@ pub(crate) fn elaborate_counting(
     faults.extend(more);
     faults.extend(graph.iter().flat_map(super::guesses::idle));
     in_order(&mut faults);
-    let graph = graph.filter(|_| !faults.iter().any(Diagnostic::is_error));
+    let differs = flat.repeats.counted.as_ref().is_some_and(Counted::differs);
+    let graph = graph.filter(|_| !differs && !faults.iter().any(Diagnostic::is_error));
     if let Some(graph) = &graph {
         debug_assert_eq!(verify(graph), Ok(()), "{}", graph.name);
     }

@@ -336,7 +336,7 @@ impl<'a> Flat<'a> {
             let ends = ports.map(|port| End { at: At::Part(part, Some(port)), span }).collect();
             return Ends { ends, wide: true, span, frame: None };
         };
-        let Some(at) = self.whole(here, index, "an index") else { return Ends::one(At::Broken, span) };
+        let Some(at) = self.index(here, index) else { return Ends::one(At::Broken, span) };
         let count = ports.len();
         let port = usize::try_from(at - 1).ok().and_then(|at| ports.nth(at));
         if port.is_none() {

@@ -198,6 +198,9 @@ impl<'a> Repeats<'a> {
         item: &[i64],
     ) -> Result<Rational, Unknown> {
         if let Some(value) = self.variable(here.turn, &name.text) {
+            if self.is_counted(here.turn, &name.text) {
+                self.counted.iter_mut().for_each(|counted| counted.reads.count = true);
+            }
             return Ok(Rational::from(value));
         }
         for scope in names.around(here.scope) {
@@ -269,11 +272,20 @@ impl<'a> Repeats<'a> {
 
     /// How many turns a parameter counts whatever its value, by its full name.
     fn counted_as(&self, full: &str) -> Option<i64> {
-        self.counted.filter(|(name, _)| *name == full).map(|(_, turns)| turns)
+        self.counted.as_ref().filter(|counted| counted.name == full).map(|counted| counted.turns)
     }
 
-    /// The number that a name stands for, found out once. One that counts other turns than its value says stands for these, and
-    /// what follows from it is not known.
+    /// A named number was read, which counts if it is `counted`.
+    fn note_named(&mut self, number: &Rational, counted: Option<i64>) {
+        if let Some(all) = &mut self.counted {
+            match counted {
+                Some(_) => all.reads.count = true,
+                None => all.read(number),
+            }
+        }
+    }
+
+    /// The number that a name stands for, found out once; of what counts how many turns.
     fn named(
         &mut self,
         names: &Names<'a>,
@@ -288,8 +300,10 @@ impl<'a> Repeats<'a> {
         }
         match self.known.get(&key) {
             Some(Known::Number(number, _)) => {
+                let number = number.clone();
                 self.read.push(key);
-                return Ok(number.clone());
+                self.note_named(&number, counted);
+                return Ok(number);
             }
             Some(Known::Other(why)) => return Err(Unknown::Reads(span, why.clone())),
             Some(Known::Open) => return Err(Unknown::Reads(span, "defined by itself".to_string())),
@@ -298,14 +312,20 @@ impl<'a> Repeats<'a> {
         let Some((reads, e, item)) = value else { return Err(Unknown::Reads(span, what.to_string())) };
         self.known.insert(key, Known::Open);
         let outside = std::mem::take(&mut self.read);
-        let mut found = self.number(names, reads, e, item);
+        let (mut found, _) = self.reading(
+            |r| r.number(names, reads, e, item),
+            |counted, _| {
+                // What follows from what counts tells another number in a model of another size.
+                if counted.reads.count {
+                    counted.note_difference();
+                }
+            },
+        );
         let of = std::mem::replace(&mut self.read, outside);
-        if let Some(turns) = counted.filter(|_| found.is_ok()) {
-            self.counting.push(key);
-            found = Ok(Rational::from(turns));
-        } else if of.iter().any(|key| self.counting.contains(key)) {
-            found = Err(Unknown::Reads(span, "it counts turns that are not as many as it says".to_string()));
+        if let (Some(turns), Ok(number)) = (counted, &mut found) {
+            *number = Rational::from(turns);
         }
+        found.iter().for_each(|number| self.note_named(number, counted));
         let known = match &found {
             Ok(number) => Known::Number(number.clone(), of),
             Err(Unknown::Reads(_, why)) if why.starts_with(FOLLOWS) => Known::Other(why.clone()),

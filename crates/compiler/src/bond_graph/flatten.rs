@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use rustc_hash::FxHashMap;
 
+use super::counted::Counted;
 use super::families::{Indices, spell};
 use super::faults::Faults;
 use super::files::Files;
@@ -248,7 +249,7 @@ pub(super) fn flatten<'a>(
     counted: Option<(&'a str, i64)>,
 ) -> Flat<'a> {
     let mut flat = Flat { files: Some(files), ..Flat::default() };
-    flat.repeats.counted = counted;
+    flat.repeats.counted = counted.map(|(name, turns)| Counted::new(name, turns));
     flat.names.overrides = given.iter().map(|g| (g.name.as_str(), &g.value)).collect();
     flat.names.scopes.push(Scope {
         prefix: String::new(),

@@ -192,7 +192,7 @@ impl<'a> Flat<'a> {
             }
         }
         for d in &component.ports {
-            let Some(indices) = self.indices(own, &d.indices) else { continue };
+            let Some(indices) = self.sizes(own, &d.indices) else { continue };
             let Some(extents) = Extents::of(&indices).filter(|e| e.count() + self.joints.len() <= MAX_TURNS) else {
                 self.too_large(d.span);
                 return;

@@ -44,6 +44,9 @@ impl<'a> Builder<'a, '_> {
             _ => {}
         }
         if let Some(value) = self.repeats.variable(cx.here.turn, text).filter(|_| plain) {
+            if self.repeats.is_counted(cx.here.turn, text) {
+                self.note_difference();
+            }
             return Some(Value::number(self.exprs.int(value), Quantity::Any));
         }
         if let Some(value) = self.flat.names.value(cx.here.scope, text) {

@@ -12,6 +12,7 @@ mod blocks;
 mod builder;
 mod common;
 mod constraint;
+mod counted;
 mod csv;
 mod declare;
 mod decls;
@@ -56,6 +57,7 @@ mod verify;
 mod warnings;
 mod wire;
 
+pub(crate) use counted::NEAR;
 pub(crate) use elaborate::elaborate_counting;
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};

@@ -54,7 +54,7 @@ impl<'a> Flat<'a> {
     pub fn port_of_kind(&mut self, owner: ScopeId, d: &'a ast::Declaration, kind: &'a ast::PortKind, way: Way) {
         let Some(scope) = self.frame(Here::of(owner), (&d.name, &[]), kind, way) else { return };
         for bond in &kind.bonds {
-            let Some(widths) = self.indices(Here::of(0), &bond.indices) else { return };
+            let Some(widths) = self.sizes(Here::of(0), &bond.indices) else { return };
             let joint = |flat: &mut Self, indices: &[i64]| {
                 let name = format!("{}.{}", d.name.text, spelled(&bond.name.text, indices));
                 flat.place(scope, &bond.name, indices, Node::Joint(flat.joints.len()));

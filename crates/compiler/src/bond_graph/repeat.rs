@@ -2,6 +2,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::counted::{Counted, Reads};
 use super::scope::{DeclId, Here, Names, ScopeId, TurnId, Valued};
 use super::uses::{Used, Uses};
 use crate::algebra::Rational;
@@ -26,6 +27,8 @@ pub(super) struct Turn<'a> {
     pub scope: ScopeId,
     /// The turn of the repetition around it, in that scope.
     pub outer: TurnId,
+    /// Whether the repetition is ended by what [counts](Counted).
+    pub counted: bool,
 }
 
 /// Why something is not known when the model is compiled.
@@ -88,10 +91,8 @@ pub(super) struct Repeats<'a> {
     /// Whether a name is only looked up, which is no use of it.
     pub looking: bool,
     pub depth: usize,
-    /// A parameter of the model that counts so many turns, whatever its value.
-    pub counted: Option<(&'a str, i64)>,
-    /// What names it.
-    pub counting: Vec<Key<'a>>,
+    /// A parameter that counts so many turns, whatever its value.
+    pub counted: Option<Counted<'a>>,
     /// How many turns have been made, those that are forgotten with them.
     made: usize,
 }
@@ -100,9 +101,8 @@ impl Default for Repeats<'_> {
     fn default() -> Self {
         let (known, shaping) = (FxHashMap::default(), FxHashSet::default());
         let (uses, looking) = (FxHashSet::default(), false);
-        let (read, counting) = (Vec::new(), Vec::new());
-        let turns = vec![None];
-        Repeats { turns, known, shaping, read, uses, looking, depth: 0, counted: None, counting, made: 0 }
+        let (turns, read) = (vec![None], Vec::new());
+        Repeats { turns, known, shaping, read, uses, looking, depth: 0, counted: None, made: 0 }
     }
 }
 
@@ -110,9 +110,16 @@ impl Default for Repeats<'_> {
 impl<'a> Repeats<'a> {
     /// A new turn.
     pub fn turn(&mut self, variable: &'a ast::Name, value: i64, here: Here) -> TurnId {
-        self.turns.push(Some(Turn { variable, value, scope: here.scope, outer: here.turn }));
+        self.turns.push(Some(Turn { variable, value, scope: here.scope, outer: here.turn, counted: false }));
         self.made += 1;
         self.turns.len() - 1
+    }
+
+    /// A new turn of a repetition that is ended by what counts.
+    pub fn counted_turn(&mut self, variable: &'a ast::Name, value: i64, here: Here) -> TurnId {
+        let turn = self.turn(variable, value, here);
+        self.turns[turn].iter_mut().for_each(|turn| turn.counted = true);
+        turn
     }
 
     /// Takes back the last turn, which nothing refers to any more, and those after it.
@@ -146,6 +153,11 @@ impl<'a> Repeats<'a> {
         self.around(turn).find(|t| t.variable.text == name).map(|t| t.value)
     }
 
+    /// Whether a loop variable is one of a repetition that is ended by what counts.
+    pub fn is_counted(&self, turn: TurnId, name: &str) -> bool {
+        self.around(turn).find(|t| t.variable.text == name).is_some_and(|t| t.counted)
+    }
+
     /// A turn in words: `i = 3, j = 1`.
     pub fn words(&self, turn: TurnId) -> String {
         let mut all: Vec<String> = self.around(turn).map(|t| format!("{} = {}", t.variable.text, t.value)).collect();
@@ -165,7 +177,7 @@ impl<'a> Repeats<'a> {
     ) -> Result<Vec<i64>, Box<Diagnostic>> {
         let mut indices = Vec::with_capacity(list.len());
         for e in list {
-            match self.whole(names, here, e, "an index") {
+            match self.place(names, here, e, "an index") {
                 Ok(index) => indices.push(index),
                 Err(Some(fault)) => return Err(fault),
                 // Brackets that are at fault, which the parser has said: the same words are said once.
@@ -178,7 +190,7 @@ impl<'a> Repeats<'a> {
         Ok(indices)
     }
 
-    /// A whole number that shapes the model; the fault if it is none, unless that has been said.
+    /// A whole number that tells how many there are of something; the fault if it is none, unless that has been said.
     pub fn whole(
         &mut self,
         names: &Names<'a>,
@@ -186,17 +198,70 @@ impl<'a> Repeats<'a> {
         e: &'a ast::Expr,
         what: &str,
     ) -> Result<i64, Option<Box<Diagnostic>>> {
-        let number = self.shaped(|r| r.number(names, here, e, &[])).map_err(|why| why.fault(what).map(Box::new))?;
-        number.as_integer().ok_or_else(|| {
+        self.whole_seen(names, here, (e, what), |counted, number| counted.look_at_size(number)).map(|(whole, _)| whole)
+    }
+
+    /// The same of an index.
+    pub fn place(
+        &mut self,
+        names: &Names<'a>,
+        here: Here,
+        e: &'a ast::Expr,
+        what: &str,
+    ) -> Result<i64, Option<Box<Diagnostic>>> {
+        self.end(names, here, e, what).map(|(whole, _)| whole)
+    }
+
+    /// The same of an end of a repetition, and whether it follows from what [counts](Counted).
+    pub fn end(
+        &mut self,
+        names: &Names<'a>,
+        here: Here,
+        e: &'a ast::Expr,
+        what: &str,
+    ) -> Result<(i64, bool), Option<Box<Diagnostic>>> {
+        self.whole_seen(names, here, (e, what), |counted, number| counted.look_at_place(e, number))
+    }
+
+    fn whole_seen(
+        &mut self,
+        names: &Names<'a>,
+        here: Here,
+        (e, what): (&'a ast::Expr, &str),
+        look: impl FnOnce(&Counted<'a>, &Rational),
+    ) -> Result<(i64, bool), Option<Box<Diagnostic>>> {
+        let (number, reads) = self.reading(|r| r.shaped(|r| r.number(names, here, e, &[])), look);
+        let number = number.map_err(|why| why.fault(what).map(Box::new))?;
+        let whole = number.as_integer().ok_or_else(|| {
             let title = format!("{what} must be a whole number");
             let d = Diagnostic::error(codes::N021, title, e.span, format!("this is {number}"));
             Some(Box::new(d.hint("`floor` gives the whole number below")))
-        })
+        })?;
+        Ok((whole, reads.count))
+    }
+
+    /// Reads something, and looks at what it follows from.
+    pub(super) fn reading<T>(
+        &mut self,
+        read: impl FnOnce(&mut Self) -> Result<T, Unknown>,
+        look: impl FnOnce(&Counted<'a>, &T),
+    ) -> (Result<T, Unknown>, Reads) {
+        let outside = self.counted.as_mut().map(|counted| std::mem::take(&mut counted.reads));
+        let found = read(self);
+        let Some((counted, outside)) = self.counted.as_mut().zip(outside) else { return (found, Reads::default()) };
+        match &found {
+            Ok(found) => look(counted, found),
+            // What is at fault here may be none elsewhere.
+            Err(_) => counted.note_difference(),
+        }
+        let reads = counted.reads;
+        counted.reads = Reads { count: outside.count || reads.count, far: outside.far || reads.far };
+        (found, reads)
     }
 
     /// A condition that shapes the model.
     pub fn condition(&mut self, names: &Names<'a>, here: Here, e: &'a ast::Expr) -> Result<bool, Unknown> {
-        self.shaped(|r| r.truth(names, here, e))
+        self.reading(|r| r.shaped(|r| r.truth(names, here, e)), |counted, _| counted.look_at_condition(e)).0
     }
 
     /// The integer that a bare name stands for, if it does; it shapes the model only if [`whole`](Self::whole) asks.
@@ -212,15 +277,19 @@ impl<'a> Repeats<'a> {
 
     /// A bare name as an index.
     pub fn name_as_index(&mut self, names: &Names<'a>, here: Here, name: &'a ast::Name) -> Option<i64> {
-        let value = self.shaped(|r| r.bare(names, here, name, &[])).ok()?;
-        value.as_integer()
+        let look = |counted: &Counted<'_>, number: &Rational| {
+            if !counted.reads.count {
+                counted.look_at_size(number);
+            }
+        };
+        self.reading(|r| r.shaped(|r| r.bare(names, here, name, &[])), look).0.ok()?.as_integer()
     }
 
     /// How many values a list with `for` has, where that is known.
     pub fn length(&mut self, names: &Names<'a>, here: Here, list: &'a ast::Repeated) -> Option<i64> {
-        let ends =
-            self.range_end(names, here, &list.to).ok()?.checked_sub(self.range_end(names, here, &list.from).ok()?);
-        Some(ends?.checked_add(1)?.max(0))
+        let ends = |r: &mut Self| Ok((r.range_end(names, here, &list.from)?, r.range_end(names, here, &list.to)?));
+        let (from, to) = self.reading(ends, |counted, ends| counted.look_at_size(&Rational::from(ends.1))).0.ok()?;
+        Some(to.checked_sub(from)?.checked_add(1)?.max(0))
     }
 
     /// The declarations of numbers that shape the model.

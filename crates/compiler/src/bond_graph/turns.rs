@@ -16,10 +16,10 @@ impl<'a> Flat<'a> {
             return;
         }
         let ends = (
-            self.whole(here, &l.from, "where a repetition begins"),
-            self.whole(here, &l.to, "where a repetition ends"),
+            self.repetition_end(here, &l.from, "where a repetition begins"),
+            self.repetition_end(here, &l.to, "where a repetition ends"),
         );
-        let (Some(from), Some(to)) = ends else { return };
+        let (Some((from, begins_so)), Some((to, ends_so))) = ends else { return };
         let Some(values) =
             self.repeats.turns_of(from, to).filter(|v| v.clone().count() * l.body.len() <= MAX_STATEMENTS)
         else {
@@ -34,7 +34,10 @@ impl<'a> Flat<'a> {
                 self.parts.reserve(others(self.parts.len() - parts));
                 self.chains.reserve(others(self.chains.len() - chains));
             }
-            let turn = self.repeats.turn(&l.variable, value, here);
+            let turn = match begins_so || ends_so {
+                true => self.repeats.counted_turn(&l.variable, value, here),
+                false => self.repeats.turn(&l.variable, value, here),
+            };
             let before = self.faults.len();
             self.fill(Here { turn, ..here }, &l.body, pseudo, imported);
             self.faults.in_turn(before, || self.repeats.words(turn));

@@ -1,6 +1,7 @@
 //! From expressions as written to exact ones, with their dimensions.
 
 use super::builder::{Builder, Value};
+use super::counted::{Counted, is_side};
 use super::dimension::Quantity;
 use super::families::FamilyId;
 use super::repeat::too_long;
@@ -341,10 +342,26 @@ impl<'a> Builder<'a, '_> {
                 BinaryOp::And => Some(self.counted_truth(cx, &b.left)? & self.counted_truth(cx, &b.right)?),
                 BinaryOp::Or => Some(self.counted_truth(cx, &b.left)? | self.counted_truth(cx, &b.right)?),
                 BinaryOp::Add | BinaryOp::Sub | BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow => None,
-                op => Some(comparison(op).holds(&self.counted(cx, &b.left)?, &self.counted(cx, &b.right)?)),
+                op => {
+                    let (left, right) = (self.counted(cx, &b.left)?, self.counted(cx, &b.right)?);
+                    if !(is_side(&b.left) && is_side(&b.right)) {
+                        self.note_difference();
+                    }
+                    Some(comparison(op).holds(&left, &right))
+                }
             },
             _ => None,
         }
+    }
+
+    /// Something may be otherwise in a model with more cells.
+    pub fn note_difference(&self) {
+        self.repeats.counted.iter().for_each(Counted::note_difference);
+    }
+
+    /// There is an array of so many elements.
+    pub fn note_array(&self, elements: usize) {
+        self.repeats.counted.iter().for_each(|counted| counted.look_at_array(elements));
     }
 
     /// A whole number, the variable of a repetition, or their sum or difference.

@@ -285,6 +285,7 @@ impl<'a> Builder<'a, '_> {
                 };
                 let indices = Shaped { shape: shape.clone(), items: Vec::new() }.indices();
                 let decls: Vec<DeclId> = indices.iter().filter_map(|i| whole.element(i)).copied().collect();
+                self.note_array(decls.len());
                 let items = decls.into_iter().map(|decl| self.declared(decl, part.name.span)).collect::<Option<_>>()?;
                 Some(Shaped { shape, items })
             }

@@ -19,10 +19,12 @@ mod tree;
 
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::ast::{Count, counts};
-use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, Name, NameKind};
+use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, NEAR, Name, NameKind};
 use crate::causal_graph::assign_causality;
-use crate::compile::{Found, Reached, Text, bond_graph_counting, read};
+use crate::compile::{Found, Reached, Read, Text, bond_graph_counting, read};
 use crate::diagnostic::Sources;
 use crate::equations::{Form, derive_equations};
 use crate::program::{Program, schedule};
@@ -37,7 +39,7 @@ parts! {
 
 /// The size of the smallest model that is looked at, unless its text reaches further: the first; the last where it tells
 /// nothing, since parts of some hundred variables are gone through in other ways than small ones.
-const SMALLEST: [i64; 2] = [16, 104];
+const SMALLEST: [i64; 2] = [NEAR, 104];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;
 /// The least size of the one that a rule is tried on: names of cells have three digits there.
@@ -71,23 +73,23 @@ struct Steps {
 
 impl Family {
     /// The family of a model; `None` if there is none, or the model is hardly larger than what would be looked at.
-    pub fn of(text: Text<'_>) -> Option<Family> {
-        (0..SMALLEST.len()).find_map(|smallest| Family::from(text, smallest))
+    pub fn of(text: Text<'_>, read: &Read) -> Option<Family> {
+        (0..SMALLEST.len()).find_map(|smallest| Family::from(text, read, smallest))
     }
 
     /// The same family by the largest members, if these are smaller.
-    pub fn larger(&self, text: Text<'_>) -> Option<Family> {
+    pub fn larger(&self, text: Text<'_>, read: &Read) -> Option<Family> {
         let last = SMALLEST.len() - 1;
-        (self.smallest < last).then(|| Family::from(text, last))?
+        (self.smallest < last).then(|| Family::from(text, read, last))?
     }
 
-    fn from(text: Text<'_>, smallest: usize) -> Option<Family> {
-        let sized = Sized::of(text)?;
+    fn from(text: Text<'_>, read: &Read, smallest: usize) -> Option<Family> {
+        let sized = Sized::of(text, read)?;
         let (first, steps) = sized.steps(smallest)?;
         let (mut members, mut sources) = (Vec::new(), None);
         for step in steps.members {
             let Reached { ir, found } = sized.member(first + STEP * step)?;
-            if !sized.is_all_that_shapes(&ir) {
+            if !sized.is_all_that_shapes(&ir) || !are_alike(&ir) {
                 return None;
             }
             sources = Some(found.sources);
@@ -140,9 +142,13 @@ struct Sized<'t> {
 }
 
 impl<'t> Sized<'t> {
-    /// By the parameter with the greatest value, of those that only count.
-    fn of(text: Text<'t>) -> Option<Sized<'t>> {
-        let sized = counts(text.text).into_iter().filter_map(|count| {
+    /// By the parameter with the greatest value, of those that count.
+    fn of(text: Text<'t>, read: &Read) -> Option<Sized<'t>> {
+        // An element of an array that has a value of its own is one far into the cells.
+        if text.overrides.iter().any(|set| set.name.contains('[')) {
+            return None;
+        }
+        let sized = counts(read.ast()).into_iter().filter_map(|count| {
             let set = text.overrides.iter().rfind(|set| set.name.trim() == count.name);
             let size = set.map_or(Some(count.value), |set| set.value.trim().parse().ok())?;
             Some(Sized { text, size, count })
@@ -152,12 +158,11 @@ impl<'t> Sized<'t> {
 
     /// The size of the smallest member, and how much larger the others are; `None` if the model itself is not much larger.
     fn steps(&self, smallest: usize) -> Option<(i64, Steps)> {
-        let reach = self.count.reach;
         let odd = self.size.rem_euclid(STEP);
-        let first = SMALLEST.get(smallest)?.max(&(2 * reach + 8)) / STEP * STEP + odd;
+        let first = SMALLEST.get(smallest)? / STEP * STEP + odd;
         let tried = TRIED.max(2 * first) / STEP * STEP + odd;
         let steps = Steps { members: [0, 1, 2, (tried - first) / STEP], wanted: (self.size - first) / STEP };
-        (reach <= SMALLEST[0] && (LARGER * tried..=MAX_TURNS as i64).contains(&self.size)).then_some((first, steps))
+        (LARGER * tried..=MAX_TURNS as i64).contains(&self.size).then_some((first, steps))
     }
 
     /// The model with so many cells, each as in the model itself, if there is nothing to be said of it.
@@ -171,4 +176,28 @@ impl<'t> Sized<'t> {
         let mut others = member.parameters.values().filter(|p| p.shapes && p.name != self.count.name);
         others.all(|p| !p.name.contains(['[', '.']))
     }
+}
+
+/// Whether the parameters of all cells have the same values: what follows from values that grow from cell to cell is otherwise
+/// where they are greater.
+fn are_alike(member: &BondGraph) -> bool {
+    let mut of_name: FxHashMap<String, (usize, Option<f64>, bool)> = FxHashMap::default();
+    for parameter in member.parameters.values().filter(|p| p.name.contains('[')) {
+        let value = member.exprs.given_value(parameter.value);
+        let (count, first, alike) = of_name.entry(without_indices(&parameter.name)).or_insert((0, value, true));
+        *count += 1;
+        *alike &= value == *first && value.is_some();
+    }
+    of_name.values().all(|&(count, _, alike)| alike || count <= NEAR as usize)
+}
+
+/// `cell[3].r` as `cell[].r`.
+fn without_indices(name: &str) -> String {
+    let mut inside = false;
+    let kept = name.chars().filter(|&letter| {
+        let kept = !inside || letter == ']';
+        inside = if letter == '[' { true } else { inside && letter != ']' };
+        kept
+    });
+    kept.collect()
 }

@@ -88,9 +88,17 @@ fn text(text: &str) -> Text<'_> {
     Text { name: "many.bond", text, files: &NoFiles, overrides: &[] }
 }
 
+fn family_of(text: Text<'_>) -> Option<Family> {
+    Family::of(text, &read(text))
+}
+
+fn larger(family: &Family, text: Text<'_>) -> Option<Family> {
+    family.larger(text, &read(text))
+}
+
 /// A model as the continuation of smaller ones.
 fn continued(text: Text<'_>) -> Option<(Family, Reached<BondGraph>)> {
-    let family = Family::of(text)?;
+    let family = family_of(text)?;
     let reached = family.bond_graph()?;
     Some((family, reached))
 }
@@ -177,7 +185,7 @@ fn obstacles(family: &Family) -> String {
 
 /// Why a model has no continued graph.
 fn obstacle_of_graph(own: &str) -> String {
-    let Some(sized) = Sized::of(text(own)) else { return ": nothing counts".into() };
+    let Some(sized) = Sized::of(text(own), &read(text(own))) else { return ": nothing counts".into() };
     let mut kept = Kept::default();
     let mut trees = Vec::new();
     for size in [16, 18, 20, 104] {
@@ -203,10 +211,10 @@ fn exactly(n: usize, body: &str) {
         continued(text(&own)).unwrap_or_else(|| panic!("no continued graph{}", obstacle_of_graph(&own)));
     assert_eq!(reached.found, stands.found);
     same(&reached.ir, &stands.ir);
-    let larger = || family.larger(text(&own))?.program(Form::Minimal);
-    let program = family.program(Form::Minimal).or_else(larger);
+    let by_larger = || larger(&family, text(&own))?.program(Form::Minimal);
+    let program = family.program(Form::Minimal).or_else(by_larger);
     let program = program.unwrap_or_else(|| {
-        panic!("no continued program{}", obstacles(family.larger(text(&own)).as_ref().unwrap_or(&family)))
+        panic!("no continued program{}", obstacles(larger(&family, text(&own)).as_ref().unwrap_or(&family)))
     });
     same(&program, &compile::compile(text(&own), Form::Minimal).unwrap().ir);
 }
@@ -359,6 +367,96 @@ fn a_size_that_is_set_counts() {
     same(&reached.ir, &stands.ir);
 }
 
+#[test]
+fn what_is_otherwise_far_into_the_cells_is_not_continued() {
+    let of_array = |array: &str, cell: &str| format!("{array}\n{}", row(cell, ""));
+    let list = "let k = [if j > 500 then 2 else 1 for j in 1..1000]";
+    let each = "for j in 1..1000 {\n let k[j] = floor(j/500)\n }";
+    let parts = |name: &str| {
+        format!("for j in 1..500 {{\n {name}[j] = 1\n }}\nparam other = 7\nfor j in 501..1000 {{\n {name}[j] = 2\n }}")
+    };
+    let inside = "component K(const r = 1; port p) {\n p -> 0:z\n for j in 1..r {\n z -> R:x[j](1)\n }\n}";
+    for body in [
+        // Conditions over several lines.
+        row("", "if (n) >\n 500 {\n a[3] -> R:leak(1)\n }"),
+        row("", "if (n - 500)*2 >\n 500 {\n a[3] -> R:leak(1)\n }"),
+        row("", "if 2 > 1 and\n (n) > 500 and\n 3 > 2 {\n a[3] -> R:leak(1)\n }"),
+        row("", "if min(n, 300) ==\n 300 {\n a[3] -> R:leak(1)\n }"),
+        row("", "param limit = 500\nif 2*n + 10 >\n limit {\n a[3] -> R:leak(1)\n }"),
+        row("if i > limit {\n a[i] -> R:x[i](1)\n }", "param limit = 500"),
+        // Arrays whose entries are known far into the cells.
+        of_array(list, "a[i] -> R:x[i](k[i])"),
+        of_array(list, "a[i] -> 1:z[i] -> C:x[i](1, q0 = k[i])"),
+        of_array(each, "a[i] -> R:x[i](1 + k[i])"),
+        of_array(each, "if k[i] == 1 {\n a[i] -> R:x[i](1)\n }"),
+        of_array("param k[1000] = [j for j in 1..1000]\nparam same = 300", "a[i] -> R:x[i](k[i])"),
+        of_array(
+            "for j in 1..1000 {\n if j == 500 {\n param k[j] = 7\n } else {\n param k[j] = 1\n }\n }",
+            "a[i] -> R:x[i](k[i])",
+        ),
+        of_array(&parts("param k"), "a[i] -> R:x[i](k[i])"),
+        of_array(&parts("discrete k"), "a[i] -> R:x[i](k[i])"),
+        format!("{inside}\n{each}\n{}", row("K:x[i](r = 1 + k[i])\n a[i] -> x[i].p", "")),
+        // Values that grow from cell to cell.
+        row("if i == 1 {\n param k[1] = 500.5\n } else {\n param k[i] = k[i - 1] - 1\n }\n a[i] -> R:x[i](k[i])", ""),
+        row("if i == 1 {\n param k[1] = 4\n } else {\n param k[i] = k[i - 1]/2\n }\n a[i] -> C:x[i](k[i])", ""),
+        // Sums over all cells, and arrays of them.
+        row("", "a[2] -> R:leak(min(max(sum(j in 1..n, 1), 200), 300))"),
+        row("let y[i] = 1", "a[2] -> R:leak(min(max(dot(y, y), 200), 300))"),
+        row("a[i] -> R:x[i](max(i, 300))", ""),
+        row("", "param m = n - 899\na[3] -> R:leak[m](1)"),
+    ] {
+        let own = model(900, &body);
+        to_bond_graph(text(&own)).unwrap_or_else(|found| panic!("{}\n{own}", found.render(false)));
+        assert!(continued(text(&own)).is_none(), "{own}");
+    }
+    exactly(900, &row("let y[i] = 3", "let k = [1, 2, 3]\nfor j in 1..3 {\n a[j] -> R:leak[j](k[j])\n }"));
+    exactly(900, &row("param k[i] = 2*r\n a[i] -> R:x[i](k[i])", "param r = 1/n"));
+}
+
+#[test]
+fn faults_far_into_the_cells_are_found() {
+    for (body, fault) in [
+        (row("let k[i] = 1", "let k[500] = 3"), "declared twice"),
+        (row("output k[i] = a[i].e", "let k[500] = 3"), "declared twice"),
+        (format!("for j in 1..500 {{\n param k[j] = 1\n }}\n{}", row("a[i] -> R:x[i](k[i])", "")), "there is no"),
+        (format!("state s[1]' = 1\ninput u[500] = 1\n{}", row("a[i] -> R:x[i](u[i])", "")), "there is no"),
+        (row("", "param m = n - 895\nparam k[4] = [1*j for j in 1..m]\na[3] -> R:x(k[2])"), "values"),
+    ] {
+        let own = model(900, &body);
+        assert!(continued(text(&own)).is_none(), "{own}");
+        let found = to_bond_graph(text(&own)).expect_err(&own).render(false);
+        assert!(found.contains(fault), "{found}");
+    }
+}
+
+#[test]
+fn an_element_of_an_array_that_is_set_is_seen() {
+    let own = model(900, &format!("param k[10] = 1\n{}", row("", "a[3] -> R:leak(k[3])")));
+    assert!(continued(text(&own)).is_some());
+    let overrides = [Override { name: "k[3]".into(), value: "2".into() }];
+    assert!(continued(Text { overrides: &overrides, ..text(&own) }).is_none());
+}
+
+#[test]
+fn what_is_imported_decides_as_the_text_does() {
+    struct Imported(&'static str);
+    impl crate::bond_graph::Files for Imported {
+        fn read(&self, _: &str) -> Result<String, crate::bond_graph::FileError> {
+            Ok(self.0.to_string())
+        }
+    }
+    let of = |imported, own: &str| {
+        let files = Imported(imported);
+        let text = Text { files: &files, ..text(own) };
+        to_bond_graph(text).unwrap_or_else(|found| panic!("{}", found.render(false)));
+        continued(text).is_some()
+    };
+    let own = model(900, &format!("import \"more.bond\"\n{}", row("", "a[3] -> R:leak(lk)")));
+    assert!(of("param lk = 1\n", &own));
+    assert!(!of("if n > 500 {\n param lk = 1\n } else {\n param lk = 7\n }\n", &own));
+}
+
 /// Numbers without a pattern.
 struct Random(u64);
 
@@ -416,9 +514,9 @@ fn random_lines(seeds: std::ops::Range<u64>) -> usize {
         };
         assert_eq!(reached.found, stands.found, "{own}");
         same(&reached.ir, &stands.ir);
-        let larger = family.larger(text(&own)).unwrap_or_else(|| panic!("{seed}: no larger members"));
-        let Some(program) = family.program(Form::Minimal).or_else(|| larger.program(Form::Minimal)) else {
-            println!("{seed}: no continued program{}", obstacles(&larger));
+        let by_larger = larger(&family, text(&own)).unwrap_or_else(|| panic!("{seed}: no larger members"));
+        let Some(program) = family.program(Form::Minimal).or_else(|| by_larger.program(Form::Minimal)) else {
+            println!("{seed}: no continued program{}", obstacles(&by_larger));
             return false;
         };
         same(&program, &compile::compile(text(&own), Form::Minimal).unwrap().ir);
@@ -448,9 +546,9 @@ fn many_lines_of_random_cells() {
 #[ignore = "asks for a file"]
 fn obstacle_of_a_file() {
     let own = std::fs::read_to_string(std::env::var("MODEL").expect("MODEL names a file")).expect("it can be read");
-    let Some(family) = Family::of(text(&own)) else { return println!("no family{}", obstacle_of_graph(&own)) };
+    let Some(family) = family_of(text(&own)) else { return println!("no family{}", obstacle_of_graph(&own)) };
     let is_whole = |family: &Family| family.bond_graph().is_some() && family.program(Form::Minimal).is_some();
-    let family = if is_whole(&family) { family } else { family.larger(text(&own)).unwrap_or(family) };
+    let family = if is_whole(&family) { family } else { larger(&family, text(&own)).unwrap_or(family) };
     match (family.bond_graph(), family.program(Form::Minimal)) {
         (Some(_), Some(_)) => println!("continued"),
         (None, _) => println!("no continued graph{}", obstacle_of_graph(&own)),
