@@ -4,7 +4,7 @@ use crate::ast::{Ast, Parsed, parse};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::bond_graph::{self, BondGraph, Files, Name, Override, elaborate_counting};
+use crate::bond_graph::{self, BondGraph, Counting, Files, Name, Override, elaborate_counting};
 use crate::causal_graph::{self, CausalGraph, assign_causality};
 use crate::diagnostic::{Diagnostic, DiagnosticCode, Diagnostics, Sources, render};
 use crate::equations::{Equations, Form, derive_equations};
@@ -100,10 +100,10 @@ pub fn bond_graph_of(read: Read, text: Text<'_>) -> Result<Reached<BondGraph>, F
 pub(crate) fn bond_graph_counting(
     read: Read,
     text: Text<'_>,
-    counted: Option<(&str, i64)>,
+    counting: Option<Counting<'_>>,
 ) -> Result<Reached<BondGraph>, Found> {
     let Read { parsed, sources } = read;
-    let elaborated = elaborate_counting(parsed.ast, sources, text.files, text.overrides, counted);
+    let elaborated = elaborate_counting(parsed.ast, sources, text.files, text.overrides, counting);
     let mut diagnostics = Diagnostics(parsed.diagnostics);
     // What could not be read is not there: that others name it, or that its bonds are missing, are no faults of their own.
     if !diagnostics.has_errors() {

@@ -13,15 +13,21 @@ use std::rc::Rc;
 use crate::algebra::Rational;
 use crate::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
 
-/// Whole numbers up to this one are near the ends of all models that are looked at.
-pub(crate) const NEAR: i64 = 16;
-
-/// A parameter that counts so many turns, whatever its value, and what was made of it.
-#[derive(Debug, Clone)]
-pub(super) struct Counted<'a> {
+/// A parameter that counts other turns than its value says.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counting<'a> {
     /// Its full name.
     pub name: &'a str,
+    /// How many turns it counts.
     pub turns: i64,
+    /// Whole numbers up to this one are near the ends of all models of other sizes.
+    pub near: i64,
+}
+
+/// The same, and what was made of it.
+#[derive(Debug, Clone)]
+pub(super) struct Counted<'a> {
+    pub is: Counting<'a>,
     /// What the number that is being read follows from.
     pub reads: Reads,
     /// Whether anything may be otherwise in a model of another size; copies share it.
@@ -38,8 +44,49 @@ pub(super) struct Reads {
 }
 
 impl<'a> Counted<'a> {
-    pub fn new(name: &'a str, turns: i64) -> Counted<'a> {
-        Counted { name, turns, reads: Reads::default(), differs: Rc::default() }
+    pub fn new(is: Counting<'a>) -> Counted<'a> {
+        Counted { is, reads: Reads::default(), differs: Rc::default() }
+    }
+
+    fn is_near(&self, number: &Rational) -> bool {
+        number.as_integer().is_some_and(|whole| whole.abs() <= self.is.near)
+    }
+
+    /// `i`, `3`, `i + 1`, `1 + i`, `i - 2`.
+    fn is_side(&self, e: &Expr) -> bool {
+        let is_name = |e: &Expr| match &e.kind {
+            ExprKind::Path(path) => path.parts.len() == 1 && path.parts[0].indices.is_empty(),
+            _ => false,
+        };
+        let is_small = |e: &Expr| match &e.kind {
+            ExprKind::Number(n) => {
+                n.unit.is_none() && Rational::from_decimal(&n.text).is_some_and(|n| self.is_near(&n))
+            }
+            _ => false,
+        };
+        match &e.kind {
+            ExprKind::Binary(b) => match b.op {
+                BinaryOp::Add => is_name(&b.left) && is_small(&b.right) || is_small(&b.left) && is_name(&b.right),
+                BinaryOp::Sub => is_name(&b.left) && is_small(&b.right),
+                _ => false,
+            },
+            _ => is_name(e) || is_small(e),
+        }
+    }
+
+    /// Comparisons of such, and what they are joined to.
+    fn is_plain(&self, e: &Expr) -> bool {
+        match &e.kind {
+            ExprKind::Unary(u) => u.op == UnaryOp::Not && self.is_plain(&u.operand),
+            ExprKind::Binary(b) => match b.op {
+                BinaryOp::And | BinaryOp::Or => self.is_plain(&b.left) && self.is_plain(&b.right),
+                BinaryOp::Lt | BinaryOp::Le | BinaryOp::Gt | BinaryOp::Ge | BinaryOp::Eq | BinaryOp::Ne => {
+                    self.is_side(&b.left) && self.is_side(&b.right)
+                }
+                _ => false,
+            },
+            _ => false,
+        }
     }
 
     /// Something may be otherwise in a model of another size.
@@ -54,14 +101,14 @@ impl<'a> Counted<'a> {
 
     /// A named number was read.
     pub fn read(&mut self, number: &Rational) {
-        self.reads.far |= !is_near(number);
+        self.reads.far |= !self.is_near(number);
     }
 
     /// Looks at an index or the end of a repetition that was read.
     pub fn look_at_place(&self, e: &Expr, number: &Rational) {
         let alike = match self.reads.count {
-            true => is_side(e) && !self.reads.far,
-            false => is_near(number),
+            true => self.is_side(e) && !self.reads.far,
+            false => self.is_near(number),
         };
         if !alike {
             self.note_difference();
@@ -70,59 +117,29 @@ impl<'a> Counted<'a> {
 
     /// Looks at a number that tells how many there are of something else.
     pub fn look_at_size(&self, number: &Rational) {
-        if self.reads.count || !is_near(number) {
+        if self.reads.count || !self.is_near(number) {
             self.note_difference();
         }
     }
 
     /// Looks at an array of so many elements, of which a long one reaches far into the cells.
     pub fn look_at_array(&self, elements: usize) {
-        if elements > NEAR as usize {
+        if elements > self.is.near as usize {
             self.note_difference();
         }
     }
 
     /// Looks at a condition that was read.
     pub fn look_at_condition(&self, e: &Expr) {
-        if self.reads.count && (self.reads.far || !is_plain(e)) {
+        if self.reads.count && (self.reads.far || !self.is_plain(e)) {
             self.note_difference();
         }
     }
-}
 
-fn is_near(number: &Rational) -> bool {
-    number.as_integer().is_some_and(|whole| whole.abs() <= NEAR)
-}
-
-/// `i`, `3`, `i + 1`, `1 + i`, `i - 2`.
-pub(super) fn is_side(e: &Expr) -> bool {
-    let is_name =
-        |e: &Expr| matches!(&e.kind, ExprKind::Path(path) if path.parts.len() == 1 && path.parts[0].indices.is_empty());
-    let is_small = |e: &Expr| match &e.kind {
-        ExprKind::Number(n) => n.unit.is_none() && Rational::from_decimal(&n.text).is_some_and(|n| is_near(&n)),
-        _ => false,
-    };
-    match &e.kind {
-        ExprKind::Binary(b) => match b.op {
-            BinaryOp::Add => is_name(&b.left) && is_small(&b.right) || is_small(&b.left) && is_name(&b.right),
-            BinaryOp::Sub => is_name(&b.left) && is_small(&b.right),
-            _ => false,
-        },
-        _ => is_name(e) || is_small(e),
-    }
-}
-
-/// Comparisons of such, and what they are joined to.
-fn is_plain(e: &Expr) -> bool {
-    match &e.kind {
-        ExprKind::Unary(u) => u.op == UnaryOp::Not && is_plain(&u.operand),
-        ExprKind::Binary(b) => match b.op {
-            BinaryOp::And | BinaryOp::Or => is_plain(&b.left) && is_plain(&b.right),
-            BinaryOp::Lt | BinaryOp::Le | BinaryOp::Gt | BinaryOp::Ge | BinaryOp::Eq | BinaryOp::Ne => {
-                is_side(&b.left) && is_side(&b.right)
-            }
-            _ => false,
-        },
-        _ => false,
+    /// Looks at two sides of a comparison of variables of repetitions.
+    pub fn look_at_sides(&self, sides: [&Expr; 2]) {
+        if !sides.into_iter().all(|side| self.is_side(side)) {
+            self.note_difference();
+        }
     }
 }

@@ -170,14 +170,14 @@ impl<'a> Flat<'a> {
 
     /// The same of an end of a repetition, and whether it follows from what counts.
     pub fn repetition_end(&mut self, here: Here, e: &'a ast::Expr, what: &str) -> Option<(i64, bool)> {
-        let found = self.repeats.end(&self.names, here, e, what);
+        let found = self.repeats.place(&self.names, here, e, what);
         self.or_lost(found)
     }
 
     /// An index; says so if it is none.
     pub fn index(&mut self, here: Here, e: &'a ast::Expr) -> Option<i64> {
         let found = self.repeats.place(&self.names, here, e, "an index");
-        self.or_lost(found)
+        self.or_lost(found).map(|(index, _)| index)
     }
 
     fn or_lost<T>(&mut self, found: Result<T, Option<Box<Diagnostic>>>) -> Option<T> {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::assemble::{Asked, Laws, Title};
 use super::builder::Builder;
 use super::constraint::Relation;
-use super::counted::Counted;
+use super::counted::{Counted, Counting};
 use super::files::Files;
 use super::flatten::{self, Flat};
 use super::load::{Loaded, load};
@@ -54,18 +54,18 @@ pub fn elaborate(main: Ast, sources: Sources, files: &dyn Files, overrides: &[Ov
 
 /// The same where a parameter of the model counts so many turns of repetitions, and places in arrays, whatever its value: the
 /// structure of a model of another size, with the values of this one. There is no graph where anything in it may be otherwise
-/// at another size than [`NEAR`](super::NEAR) the ends of the repetitions.
+/// at another size, further than so many cells from the ends of the repetitions.
 pub(crate) fn elaborate_counting(
     main: Ast,
     mut sources: Sources,
     files: &dyn Files,
     overrides: &[Override],
-    counted: Option<(&str, i64)>,
+    counting: Option<Counting<'_>>,
 ) -> Elaborated {
     let Loaded { files: trees, imports, mut faults } = load(main, &mut sources, files);
     let given = overrides::parse(overrides, &mut sources, &mut faults);
     let title = trees.first().and_then(|t| t.header.as_ref()).map_or(Title::default(), Title::of);
-    let mut flat = flatten::flatten(&trees, &given, files, counted);
+    let mut flat = flatten::flatten(&trees, &given, files, counting);
     faults.extend(std::mem::take(&mut flat.faults).into_list());
     overrides::refuse_idle(&given, &flat, &mut faults);
     let Built { graph, faults: more, uses } = match flat.lost {

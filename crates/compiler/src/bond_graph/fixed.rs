@@ -272,7 +272,7 @@ impl<'a> Repeats<'a> {
 
     /// How many turns a parameter counts whatever its value, by its full name.
     fn counted_as(&self, full: &str) -> Option<i64> {
-        self.counted.as_ref().filter(|counted| counted.name == full).map(|counted| counted.turns)
+        self.counted.as_ref().filter(|counted| counted.is.name == full).map(|counted| counted.is.turns)
     }
 
     /// A named number was read, which counts if it is `counted`.

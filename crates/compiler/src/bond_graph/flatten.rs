@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use rustc_hash::FxHashMap;
 
-use super::counted::Counted;
+use super::counted::{Counted, Counting};
 use super::families::{Indices, spell};
 use super::faults::Faults;
 use super::files::Files;
@@ -246,10 +246,10 @@ pub(super) fn flatten<'a>(
     trees: &'a [ast::Ast],
     given: &'a [Given],
     files: &'a dyn Files,
-    counted: Option<(&'a str, i64)>,
+    counting: Option<Counting<'a>>,
 ) -> Flat<'a> {
     let mut flat = Flat { files: Some(files), ..Flat::default() };
-    flat.repeats.counted = counted.map(|(name, turns)| Counted::new(name, turns));
+    flat.repeats.counted = counting.map(Counted::new);
     flat.names.overrides = given.iter().map(|g| (g.name.as_str(), &g.value)).collect();
     flat.names.scopes.push(Scope {
         prefix: String::new(),

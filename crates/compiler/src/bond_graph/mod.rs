@@ -57,7 +57,7 @@ mod verify;
 mod warnings;
 mod wire;
 
-pub(crate) use counted::NEAR;
+pub(crate) use counted::Counting;
 pub(crate) use elaborate::elaborate_counting;
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};

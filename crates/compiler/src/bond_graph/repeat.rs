@@ -178,7 +178,7 @@ impl<'a> Repeats<'a> {
         let mut indices = Vec::with_capacity(list.len());
         for e in list {
             match self.place(names, here, e, "an index") {
-                Ok(index) => indices.push(index),
+                Ok((index, _)) => indices.push(index),
                 Err(Some(fault)) => return Err(fault),
                 // Brackets that are at fault, which the parser has said: the same words are said once.
                 Err(None) => {
@@ -201,19 +201,8 @@ impl<'a> Repeats<'a> {
         self.whole_seen(names, here, (e, what), |counted, number| counted.look_at_size(number)).map(|(whole, _)| whole)
     }
 
-    /// The same of an index.
+    /// The same of an index, or of an end of a repetition, and whether it follows from what [counts](Counted).
     pub fn place(
-        &mut self,
-        names: &Names<'a>,
-        here: Here,
-        e: &'a ast::Expr,
-        what: &str,
-    ) -> Result<i64, Option<Box<Diagnostic>>> {
-        self.end(names, here, e, what).map(|(whole, _)| whole)
-    }
-
-    /// The same of an end of a repetition, and whether it follows from what [counts](Counted).
-    pub fn end(
         &mut self,
         names: &Names<'a>,
         here: Here,

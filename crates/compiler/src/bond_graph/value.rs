@@ -1,7 +1,7 @@
 //! From expressions as written to exact ones, with their dimensions.
 
 use super::builder::{Builder, Value};
-use super::counted::{Counted, is_side};
+use super::counted::Counted;
 use super::dimension::Quantity;
 use super::families::FamilyId;
 use super::repeat::too_long;
@@ -344,9 +344,7 @@ impl<'a> Builder<'a, '_> {
                 BinaryOp::Add | BinaryOp::Sub | BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow => None,
                 op => {
                     let (left, right) = (self.counted(cx, &b.left)?, self.counted(cx, &b.right)?);
-                    if !(is_side(&b.left) && is_side(&b.right)) {
-                        self.note_difference();
-                    }
+                    self.repeats.counted.iter().for_each(|counted| counted.look_at_sides([&b.left, &b.right]));
                     Some(comparison(op).holds(&left, &right))
                 }
             },

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::ast::{Count, counts};
-use crate::bond_graph::{BondGraph, MAX_PARTS, MAX_TURNS, NEAR, Name, NameKind};
+use crate::bond_graph::{BondGraph, Counting, MAX_PARTS, MAX_TURNS, Name, NameKind};
 use crate::causal_graph::assign_causality;
 use crate::compile::{Found, Reached, Read, Text, bond_graph_counting, read};
 use crate::diagnostic::Sources;
@@ -39,7 +39,7 @@ parts! {
 
 /// The size of the smallest model that is looked at, unless its text reaches further: the first; the last where it tells
 /// nothing, since parts of some hundred variables are gone through in other ways than small ones.
-const SMALLEST: [i64; 2] = [NEAR, 104];
+const SMALLEST: [i64; 2] = [16, 104];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;
 /// The least size of the one that a rule is tried on: names of cells have three digits there.
@@ -88,8 +88,8 @@ impl Family {
         let (first, steps) = sized.steps(smallest)?;
         let (mut members, mut sources) = (Vec::new(), None);
         for step in steps.members {
-            let Reached { ir, found } = sized.member(first + STEP * step)?;
-            if !sized.is_all_that_shapes(&ir) || !are_alike(&ir) {
+            let Reached { ir, found } = sized.member(first + STEP * step, first)?;
+            if !sized.is_all_that_shapes(&ir) || !are_alike(&ir, first as usize) {
                 return None;
             }
             sources = Some(found.sources);
@@ -165,9 +165,11 @@ impl<'t> Sized<'t> {
         (LARGER * tried..=MAX_TURNS as i64).contains(&self.size).then_some((first, steps))
     }
 
-    /// The model with so many cells, each as in the model itself, if there is nothing to be said of it.
-    fn member(&self, size: i64) -> Option<Reached<BondGraph>> {
-        let member = bond_graph_counting(read(self.text), self.text, Some((&self.count.name, size))).ok()?;
+    /// The model with so many cells, each as in the model itself, if there is nothing to be said of it. `smallest`: the least of
+    /// all sizes that are looked at; what the text says of cells up to this one shows at all of them.
+    fn member(&self, size: i64, smallest: i64) -> Option<Reached<BondGraph>> {
+        let counting = Counting { name: &self.count.name, turns: size, near: smallest };
+        let member = bond_graph_counting(read(self.text), self.text, Some(counting)).ok()?;
         member.found.diagnostics.0.is_empty().then_some(member)
     }
 
@@ -179,8 +181,8 @@ impl<'t> Sized<'t> {
 }
 
 /// Whether the parameters of all cells have the same values: what follows from values that grow from cell to cell is otherwise
-/// where they are greater.
-fn are_alike(member: &BondGraph) -> bool {
+/// where they are greater. Few may differ.
+fn are_alike(member: &BondGraph, near: usize) -> bool {
     let mut of_name: FxHashMap<String, (usize, Option<f64>, bool)> = FxHashMap::default();
     for parameter in member.parameters.values().filter(|p| p.name.contains('[')) {
         let value = member.exprs.given_value(parameter.value);
@@ -188,7 +190,7 @@ fn are_alike(member: &BondGraph) -> bool {
         *count += 1;
         *alike &= value == *first && value.is_some();
     }
-    of_name.values().all(|&(count, _, alike)| alike || count <= NEAR as usize)
+    of_name.values().all(|&(count, _, alike)| alike || count <= near)
 }
 
 /// `cell[3].r` as `cell[].r`.

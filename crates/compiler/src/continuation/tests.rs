@@ -189,7 +189,7 @@ fn obstacle_of_graph(own: &str) -> String {
     let mut kept = Kept::default();
     let mut trees = Vec::new();
     for size in [16, 18, 20, 104] {
-        let Some(member) = sized.member(size) else { return ": something is to be said of a member".into() };
+        let Some(member) = sized.member(size, 16) else { return ": something is to be said of a member".into() };
         trees.push(member.ir.tree(&mut kept));
     }
     all_obstacles(&trees, 44)
