@@ -18,8 +18,9 @@ use crate::ast::{BinaryOp, Expr, ExprKind, UnaryOp};
 pub(crate) struct Counting<'a> {
     /// Its full name.
     pub name: &'a str,
-    /// How many turns it counts.
+    /// How many turns it counts, and how many it is.
     pub turns: i64,
+    pub wanted: i64,
     /// Whole numbers up to this one are near the ends of all models of other sizes.
     pub near: i64,
 }
@@ -39,6 +40,8 @@ pub(super) struct Counted<'a> {
 pub(super) struct Reads {
     /// The parameter, or a variable of a repetition that it ends.
     pub count: bool,
+    /// Such a variable.
+    pub variable: bool,
     /// A named number that is not near.
     pub far: bool,
 }
@@ -97,6 +100,18 @@ impl<'a> Counted<'a> {
     /// Whether something may be otherwise.
     pub fn differs(&self) -> bool {
         self.differs.get()
+    }
+
+    /// What is at most here where so many are allowed in the model that is wanted.
+    pub fn share_of(&self, most: usize) -> usize {
+        most / (self.is.wanted / self.is.turns.max(1) + 1).max(1) as usize
+    }
+
+    /// Looks at the ends of a repetition that were read: near another cell may be far from the ends, from turn to turn.
+    pub fn look_at_ends(&self, ends: [Reads; 2]) {
+        if ends.iter().any(|end| end.variable) {
+            self.note_difference();
+        }
     }
 
     /// A named number was read.

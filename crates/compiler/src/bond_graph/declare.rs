@@ -1,6 +1,7 @@
 //! Values and nodes under their names: one, or all elements of an array.
 
 use super::arrays::{self, Extents};
+use super::counted::Reads;
 use super::decls::unit_of_literal;
 use super::families::Indices;
 use super::flatten::{Flat, full_name};
@@ -52,7 +53,9 @@ impl<'a> Flat<'a> {
             self.declare(here, reads, (&d.name, &indices), kind, unit, doc);
             return;
         }
-        let Some(extents) = Extents::of(&indices).filter(|e| e.count() + self.names.decls.len() <= MAX_TURNS) else {
+        let Some(extents) =
+            Extents::of(&indices).filter(|e| e.count() + self.names.decls.len() <= self.repeats.most(MAX_TURNS))
+        else {
             self.too_large(d.span);
             return;
         };
@@ -168,8 +171,8 @@ impl<'a> Flat<'a> {
         self.or_lost(found)
     }
 
-    /// The same of an end of a repetition, and whether it follows from what counts.
-    pub fn repetition_end(&mut self, here: Here, e: &'a ast::Expr, what: &str) -> Option<(i64, bool)> {
+    /// The same of an end of a repetition, and what it follows from.
+    pub fn repetition_end(&mut self, here: Here, e: &'a ast::Expr, what: &str) -> Option<(i64, Reads)> {
         let found = self.repeats.place(&self.names, here, e, what);
         self.or_lost(found)
     }

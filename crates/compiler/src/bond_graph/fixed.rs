@@ -199,7 +199,10 @@ impl<'a> Repeats<'a> {
     ) -> Result<Rational, Unknown> {
         if let Some(value) = self.variable(here.turn, &name.text) {
             if self.is_counted(here.turn, &name.text) {
-                self.counted.iter_mut().for_each(|counted| counted.reads.count = true);
+                self.counted.iter_mut().for_each(|counted| {
+                    counted.reads.count = true;
+                    counted.reads.variable = true;
+                });
             }
             return Ok(Rational::from(value));
         }

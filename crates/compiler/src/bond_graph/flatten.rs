@@ -443,7 +443,9 @@ impl<'a> Flat<'a> {
     }
 
     fn element(&mut self, here: Here, element: &'a ast::Element, pseudo: bool) {
-        if self.parts.len() >= MAX_PARTS || self.names.scopes.len() >= MAX_INSTANCES {
+        if self.parts.len() >= self.repeats.most(MAX_PARTS)
+            || self.names.scopes.len() >= self.repeats.most(MAX_INSTANCES)
+        {
             self.too_large(element.span);
             return;
         }

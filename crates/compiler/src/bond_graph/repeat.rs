@@ -129,12 +129,17 @@ impl<'a> Repeats<'a> {
 
     /// The values of the variable of a repetition of statements, of which there may be none; `None` if they are too many.
     pub fn turns_of(&self, from: i64, to: i64) -> Option<std::ops::RangeInclusive<i64>> {
-        values_of(from, to, MAX_TURNS.checked_sub(self.turns.len())?)
+        values_of(from, to, self.most(MAX_TURNS).checked_sub(self.turns.len())?)
     }
 
     /// The same for a sum.
     pub fn terms_of(&self, from: i64, to: i64) -> Option<std::ops::RangeInclusive<i64>> {
-        values_of(from, to, MAX_TERMS.checked_sub(self.made)?)
+        values_of(from, to, self.most(MAX_TERMS).checked_sub(self.made)?)
+    }
+
+    /// What there may be at most where so much may be in the model itself.
+    pub fn most(&self, most: usize) -> usize {
+        self.counted.as_ref().map_or(most, |counted| counted.share_of(most))
     }
 
     /// All turns, in order.
@@ -201,14 +206,14 @@ impl<'a> Repeats<'a> {
         self.whole_seen(names, here, (e, what), |counted, number| counted.look_at_size(number)).map(|(whole, _)| whole)
     }
 
-    /// The same of an index, or of an end of a repetition, and whether it follows from what [counts](Counted).
+    /// The same of an index, or of an end of a repetition, and what it follows from.
     pub fn place(
         &mut self,
         names: &Names<'a>,
         here: Here,
         e: &'a ast::Expr,
         what: &str,
-    ) -> Result<(i64, bool), Option<Box<Diagnostic>>> {
+    ) -> Result<(i64, Reads), Option<Box<Diagnostic>>> {
         self.whole_seen(names, here, (e, what), |counted, number| counted.look_at_place(e, number))
     }
 
@@ -218,7 +223,7 @@ impl<'a> Repeats<'a> {
         here: Here,
         (e, what): (&'a ast::Expr, &str),
         look: impl FnOnce(&Counted<'a>, &Rational),
-    ) -> Result<(i64, bool), Option<Box<Diagnostic>>> {
+    ) -> Result<(i64, Reads), Option<Box<Diagnostic>>> {
         let (number, reads) = self.reading(|r| r.shaped(|r| r.number(names, here, e, &[])), look);
         let number = number.map_err(|why| why.fault(what).map(Box::new))?;
         let whole = number.as_integer().ok_or_else(|| {
@@ -226,7 +231,7 @@ impl<'a> Repeats<'a> {
             let d = Diagnostic::error(codes::N021, title, e.span, format!("this is {number}"));
             Some(Box::new(d.hint("`floor` gives the whole number below")))
         })?;
-        Ok((whole, reads.count))
+        Ok((whole, reads))
     }
 
     /// Reads something, and looks at what it follows from.
@@ -244,7 +249,11 @@ impl<'a> Repeats<'a> {
             Err(_) => counted.note_difference(),
         }
         let reads = counted.reads;
-        counted.reads = Reads { count: outside.count || reads.count, far: outside.far || reads.far };
+        counted.reads = Reads {
+            count: outside.count || reads.count,
+            variable: outside.variable || reads.variable,
+            far: outside.far || reads.far,
+        };
         (found, reads)
     }
 

@@ -19,10 +19,10 @@ impl<'a> Flat<'a> {
             self.repetition_end(here, &l.from, "where a repetition begins"),
             self.repetition_end(here, &l.to, "where a repetition ends"),
         );
-        let (Some((from, begins_so)), Some((to, ends_so))) = ends else { return };
-        let Some(values) =
-            self.repeats.turns_of(from, to).filter(|v| v.clone().count() * l.body.len() <= MAX_STATEMENTS)
-        else {
+        let (Some((from, begins)), Some((to, ends))) = ends else { return };
+        self.repeats.counted.iter().for_each(|counted| counted.look_at_ends([begins, ends]));
+        let most = self.repeats.most(MAX_STATEMENTS);
+        let Some(values) = self.repeats.turns_of(from, to).filter(|v| v.clone().count() * l.body.len() <= most) else {
             self.too_large(l.from.span.to(l.to.span));
             return;
         };
@@ -34,7 +34,7 @@ impl<'a> Flat<'a> {
                 self.parts.reserve(others(self.parts.len() - parts));
                 self.chains.reserve(others(self.chains.len() - chains));
             }
-            let turn = match begins_so || ends_so {
+            let turn = match begins.count || ends.count {
                 true => self.repeats.counted_turn(&l.variable, value, here),
                 false => self.repeats.turn(&l.variable, value, here),
             };

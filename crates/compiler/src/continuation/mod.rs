@@ -40,6 +40,9 @@ parts! {
 /// The size of the smallest model that is looked at, unless its text reaches further: the first; the last where it tells
 /// nothing, since parts of some hundred variables are gone through in other ways than small ones.
 const SMALLEST: [i64; 2] = [16, 104];
+/// How far from the ends the text may reach where these are the smallest: twice, by an end of a repetition and from there, from
+/// both ends, and the largest of those looked at has cells between.
+const NEAR: [i64; 2] = [16, 32];
 /// The sizes of models that are looked at differ by this much: what goes on from both ends of a repetition meets in the middle.
 const STEP: i64 = 2;
 /// The least size of the one that a rule is tried on: names of cells have three digits there.
@@ -88,8 +91,8 @@ impl Family {
         let (first, steps) = sized.steps(smallest)?;
         let (mut members, mut sources) = (Vec::new(), None);
         for step in steps.members {
-            let Reached { ir, found } = sized.member(first + STEP * step, first)?;
-            if !sized.is_all_that_shapes(&ir) || !are_alike(&ir, first as usize) {
+            let Reached { ir, found } = sized.member(first + STEP * step, NEAR[smallest])?;
+            if !sized.is_all_that_shapes(&ir) || !are_alike(&ir, NEAR[smallest] as usize) {
                 return None;
             }
             sources = Some(found.sources);
@@ -165,10 +168,10 @@ impl<'t> Sized<'t> {
         (LARGER * tried..=MAX_TURNS as i64).contains(&self.size).then_some((first, steps))
     }
 
-    /// The model with so many cells, each as in the model itself, if there is nothing to be said of it. `smallest`: the least of
-    /// all sizes that are looked at; what the text says of cells up to this one shows at all of them.
-    fn member(&self, size: i64, smallest: i64) -> Option<Reached<BondGraph>> {
-        let counting = Counting { name: &self.count.name, turns: size, near: smallest };
+    /// The model with so many cells, each as in the model itself, if there is nothing to be said of it, and its text reaches no
+    /// further into the cells than this.
+    fn member(&self, size: i64, near: i64) -> Option<Reached<BondGraph>> {
+        let counting = Counting { name: &self.count.name, turns: size, wanted: self.size, near };
         let member = bond_graph_counting(read(self.text), self.text, Some(counting)).ok()?;
         member.found.diagnostics.0.is_empty().then_some(member)
     }

@@ -98,9 +98,13 @@ fn larger(family: &Family, text: Text<'_>) -> Option<Family> {
 
 /// A model as the continuation of smaller ones.
 fn continued(text: Text<'_>) -> Option<(Family, Reached<BondGraph>)> {
-    let family = family_of(text)?;
-    let reached = family.bond_graph()?;
-    Some((family, reached))
+    let mut family = family_of(text)?;
+    loop {
+        if let Some(reached) = family.bond_graph() {
+            return Some((family, reached));
+        }
+        family = larger(&family, text)?;
+    }
 }
 
 /// Where two trees differ first.
@@ -189,7 +193,7 @@ fn obstacle_of_graph(own: &str) -> String {
     let mut kept = Kept::default();
     let mut trees = Vec::new();
     for size in [16, 18, 20, 104] {
-        let Some(member) = sized.member(size, 16) else { return ": something is to be said of a member".into() };
+        let Some(member) = sized.member(size, NEAR[0]) else { return ": something is to be said of a member".into() };
         trees.push(member.ir.tree(&mut kept));
     }
     all_obstacles(&trees, 44)
@@ -412,6 +416,36 @@ fn what_is_otherwise_far_into_the_cells_is_not_continued() {
     }
     exactly(900, &row("let y[i] = 3", "let k = [1, 2, 3]\nfor j in 1..3 {\n a[j] -> R:leak[j](k[j])\n }"));
     exactly(900, &row("param k[i] = 2*r\n a[i] -> R:x[i](k[i])", "param r = 1/n"));
+}
+
+#[test]
+fn what_is_between_both_ends_is_seen_or_not_continued() {
+    let window = |near: usize| row(&format!("if i < n - {near} and i > {near} {{\n a[i] -> R:z[i](1)\n }}"), "");
+    let steps = |by: usize, times: usize, then: &str| {
+        let variable = |at: usize| if at == 0 { "i".to_string() } else { format!("b{at}") };
+        let end = |at: usize| format!("{} - {by}", variable(at));
+        let heads = (0..times).map(|at| format!("for {} in {}..{} {{\n", variable(at + 1), end(at), end(at)));
+        row(&(heads.collect::<String>() + &then.replace("LAST", &variable(times)) + &"\n }".repeat(times)), "")
+    };
+    for body in [
+        window(104),
+        window(60),
+        row("if i < n - 104 {\n if i > 104 {\n a[i] -> R:z[i](1)\n }\n }", ""),
+        row("if not (i >= n - 104 or i <= 104) {\n a[i] -> R:z[i](1)\n }", ""),
+        row(
+            "for m in n - 104..n - 104 {\n let u[i] = if i < m and i > 104 then 2 else 1\n }\n a[i] -> R:z[i](u[i])",
+            "",
+        ),
+        steps(104, 2, "if LAST == 50 {\n a[i] -> R:z[i](1)\n }"),
+        steps(16, 7, "if LAST == 4 {\n a[i] -> R:z[i](1)\n }"),
+        row("", "for b in n - 104..n - 104 {\n for d in b - 104..b - 104 {\n a[d] -> R:z(1)\n }\n }"),
+        row("output s[i] = a[i].e*sum(j in 1..16, sum(k in 1..16, sum(l in 1..16, sum(m in 1..4, 1))))", ""),
+    ] {
+        let own = model(1700, &body);
+        assert!(continued(text(&own)).is_none(), "{own}");
+    }
+    exactly(1700, &window(16));
+    exactly(1700, &window(32));
 }
 
 #[test]
