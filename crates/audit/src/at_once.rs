@@ -5,6 +5,7 @@
 //! hold by their laws is known at every sample without an integral; it changes by no more than the other ports can pass
 //! meanwhile, at the greatest power that they have around.
 
+use crate::lanes::add;
 use crate::scales::{Quantity, Term};
 use crate::worst::Raw;
 
@@ -27,7 +28,7 @@ impl AtOnce {
 
     /// A storage holds this energy, but for what impulses have given.
     pub fn stores(&mut self, energy: &[f64]) {
-        self.stored.iter_mut().zip(energy).for_each(|(sum, own)| *sum += own);
+        add(&mut self.stored, energy);
     }
 
     /// Another port passes this power.
@@ -37,9 +38,8 @@ impl AtOnce {
 
     /// What these storages hold and others, and what passes all ports.
     pub fn with(mut self, more: AtOnce) -> AtOnce {
-        let add = |all: &mut Vec<f64>, more: Vec<f64>| all.iter_mut().zip(more).for_each(|(sum, own)| *sum += own);
-        add(&mut self.stored, more.stored);
-        add(&mut self.passed, more.passed);
+        add(&mut self.stored, &more.stored);
+        add(&mut self.passed, &more.passed);
         self
     }
 

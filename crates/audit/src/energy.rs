@@ -1,7 +1,7 @@
 //! What is stored changes by what flows in.
 
 use crate::at_once::{AtOnce, STRETCHES};
-use crate::lanes::{are_finite, greatest, greatest_product, higher};
+use crate::lanes::{add, are_finite, greatest, greatest_product, higher};
 use crate::laws::sensitivities;
 use crate::on_all_cores::on_all_cores;
 use crate::quadrature::{Integral, gauss};
@@ -252,10 +252,10 @@ impl Held {
                     told &= !matches!(element.kind, Kind::Inertance(_) | Kind::Compliance(_));
                     at_once.passes(&power);
                     values.quadrature.integrate_into(&power, &mut integral);
-                    uncertainty.iter_mut().zip(&integral.uncertainty).for_each(|(sum, own)| *sum += own);
+                    add(&mut uncertainty, &integral.uncertainty);
                 }
             };
-            missing.iter_mut().zip(&integral.values).for_each(|(sum, own)| *sum += own);
+            add(&mut missing, &integral.values);
             moved = higher(moved, greatest(&integral.values));
         }
         Ok(Held { missing, uncertainty, moved, gains, told, at_once })
@@ -263,9 +263,8 @@ impl Held {
 
     /// By these ports and others.
     fn with(mut self, more: Held) -> Held {
-        let add = |all: &mut Vec<f64>, more: Vec<f64>| all.iter_mut().zip(more).for_each(|(sum, own)| *sum += own);
-        add(&mut self.missing, more.missing);
-        add(&mut self.uncertainty, more.uncertainty);
+        add(&mut self.missing, &more.missing);
+        add(&mut self.uncertainty, &more.uncertainty);
         self.gains.extend(more.gains);
         let at_once = self.at_once.with(more.at_once);
         Held { moved: higher(self.moved, more.moved), told: self.told && more.told, at_once, ..self }

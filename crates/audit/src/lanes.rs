@@ -8,6 +8,11 @@ pub(crate) fn higher(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }
 }
 
+/// Adds a column to a sum of such.
+pub(crate) fn add(sum: &mut [f64], column: &[f64]) {
+    sum.iter_mut().zip(column).for_each(|(sum, own)| *sum += own);
+}
+
 /// The greatest magnitude; what is not a number does not count.
 pub(crate) fn greatest(column: &[f64]) -> f64 {
     let (chunks, rest) = column.as_chunks::<LANES>();

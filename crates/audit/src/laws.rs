@@ -93,7 +93,7 @@ pub(crate) fn residual(
     worst: &mut Worst,
     unchecked: &mut Vec<String>,
 ) {
-    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
+    let mut check = Check::new(graph, values, (scales, settled));
     for (name, symbol, left, right) in values.same() {
         let of = scales.of(graph, symbol);
         check.sum(name, &[(1.0, left), (-1.0, right)], "two names of one variable", of);
@@ -101,7 +101,7 @@ pub(crate) fn residual(
     let Check { worst: names, laws: mut before, .. } = check;
     worst.absorb(0, names, settled);
     let of_elements = on_all_cores(&fixed(graph), values, |elements, values| {
-        let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
+        let mut check = Check::new(graph, values, (scales, settled));
         let unchecked = check.elements(elements, quotients);
         (check.worst, check.laws, unchecked)
     });
@@ -110,7 +110,7 @@ pub(crate) fn residual(
         before += laws;
         unchecked.extend(missing);
     }
-    let mut check = Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() };
+    let mut check = Check::new(graph, values, (scales, settled));
     let mut written = Vec::new();
     for share in shares {
         let name = &graph.elements[share.junction].name;
@@ -523,6 +523,10 @@ struct Check<'a, 'b> {
 }
 
 impl<'a, 'b> Check<'a, 'b> {
+    fn new(graph: &'b BondGraph, values: &'b Values<'a>, (scales, settled): (&'b Scales, &'b Settled)) -> Self {
+        Check { graph, values, scales, settled, worst: Worst::default(), laws: 0, row: Vec::new() }
+    }
+
     /// Checks the laws of elements; says what could not be checked.
     fn elements(&mut self, elements: &[&'b Element], quotients: &Quotients) -> Vec<String> {
         let (mut unchecked, mut written) = (Vec::new(), Vec::new());

@@ -19,7 +19,7 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::span::Span;
 
 /// The greatest number of elements and junctions of a model.
-pub(crate) const MAX_PARTS: usize = 2_000_000;
+pub(super) const MAX_PARTS: usize = 2_000_000;
 /// The greatest number of instances of components.
 const MAX_INSTANCES: usize = 500_000;
 

@@ -61,7 +61,6 @@ pub(crate) use counted::Counting;
 pub(crate) use elaborate::elaborate_counting;
 pub use elaborate::{Elaborated, elaborate};
 pub use files::{FileError, Files, NoFiles};
-pub(crate) use flatten::MAX_PARTS;
 pub(crate) use multibonds::{part_name, strand_name};
 pub use names::{Name, NameKind};
 pub use overrides::Override;

@@ -1,12 +1,12 @@
 //! Models of many equal cells: what a stage gives for three sizes that follow each other is continued to the size asked for.
 //!
 //! A parameter that [counts] the turns of a repetition makes a family of models, one for each number of turns, all with the
-//! values that the model itself has. What is made far
-//! from the ends of the repetition is made of the same text in the same way, so the graphs, and the programs, of three
-//! sizes tell those of all: each sequence in them is a few entries that stand alone and a few that come again turn by turn,
-//! each place a straight line in the turn and in the size (`rule.rs`). A rule has to give the three it was found from
-//! exactly, and one much larger, in which names have more digits and each turn has left both ends behind; where it does
-//! not, or the text is none of a family, there is no continuation, and the model is compiled as it stands.
+//! values that the model itself has. What is made far from the ends of the repetition is made of the same text in the same
+//! way, so the graphs, and the programs, of three sizes tell those of all: each sequence in them is a few entries that stand
+//! alone and a few that come again turn by turn, each place a straight line in the turn and in the size (`rule.rs`). A rule has
+//! to give the three it was found from exactly, and one much larger, in which names have more digits and each turn has left
+//! both ends behind; where it does not, or the text is none of a family, there is no continuation, and the model is compiled
+//! as it stands.
 
 mod graph;
 mod parts;
@@ -22,7 +22,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::ast::{Count, counts};
-use crate::bond_graph::{BondGraph, Counting, MAX_PARTS, MAX_TURNS, Name, NameKind};
+use crate::bond_graph::{BondGraph, Counting, MAX_TURNS, Name, NameKind};
 use crate::causal_graph::assign_causality;
 use crate::compile::{Found, Reached, Read, Text, bond_graph_counting, read};
 use crate::diagnostic::Sources;
@@ -37,8 +37,8 @@ parts! {
     structure Name { name, kind, declared, uses }
 }
 
-/// The size of the smallest model that is looked at, unless its text reaches further: the first; the last where it tells
-/// nothing, since parts of some hundred variables are gone through in other ways than small ones.
+/// The size of the smallest model that is looked at: the first; the last where that tells nothing, since the text reaches
+/// further, or parts of some hundred variables are gone through in other ways than small ones.
 const SMALLEST: [i64; 2] = [16, 104];
 /// How far from the ends the text may reach where these are the smallest: twice, by an end of a repetition and from there, from
 /// both ends, and the largest of those looked at has cells between.
@@ -56,12 +56,10 @@ const LARGER: i64 = 8;
 pub struct Family {
     members: Vec<Member>,
     steps: Steps,
-    /// Which of the smallest sizes its members begin with, and the size of the first of them.
+    /// Which of the smallest sizes its members begin with.
     smallest: usize,
     /// The texts of the model.
     sources: Sources,
-    /// Elements in a step of the size.
-    elements: usize,
 }
 
 /// Its graph, and the names in its text.
@@ -98,21 +96,14 @@ impl Family {
             sources = Some(found.sources);
             members.push((Arc::new(ir), found.names));
         }
-        let sources = sources?;
-        let elements = members[1].0.elements.len().saturating_sub(members[0].0.elements.len());
-        Some(Family { members, steps, smallest, sources, elements })
+        Some(Family { members, steps, smallest, sources: sources? })
     }
 
     /// The model itself as the continuation of smaller ones.
     pub fn bond_graph(&self) -> Option<Reached<BondGraph>> {
-        // What is too large is refused where it is compiled as it stands.
-        if self.elements.saturating_mul(self.steps.wanted as usize) > MAX_PARTS {
-            return None;
-        }
         let (graph, names) = self.continued(|at| Some(self.members[at].clone()))?;
         let found = Found { names, sources: self.sources.clone(), ..Found::default() };
-        let ir = Arc::unwrap_or_clone(graph);
-        (ir.cells.len() <= MAX_TURNS).then_some(Reached { ir, found })
+        Some(Reached { ir: Arc::unwrap_or_clone(graph), found })
     }
 
     /// The program of the model in a form as the continuation of those of smaller ones, if there is one.

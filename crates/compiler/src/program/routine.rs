@@ -427,9 +427,7 @@ impl<'a> Builder<'a> {
                 }
                 _ => items.push(Item::Value(value)),
             }
-            if let Some(guards) = watch_after.get(&value).filter(|_| !watch_after.is_empty()) {
-                items.extend(guards.iter().copied().map(Item::PivotGuard));
-            }
+            items.extend(watch_after.get(&value).into_iter().flatten().copied().map(Item::PivotGuard));
         }
         items
     }
